@@ -1,0 +1,3 @@
+//! The program `vg`.
+
+fn main() {}

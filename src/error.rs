@@ -1,0 +1,75 @@
+//! One error type. Every message says which argument (or file and field), what was found, what is allowed.
+
+use std::path::{Path, PathBuf};
+
+/// Result with this crate's [`Error`].
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Why a call did not do what it was asked. Nothing the caller owns was changed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An argument is outside what the function accepts.
+    #[error("{argument}: {found}; allowed: {allowed}")]
+    Argument {
+        /// The argument, with its index where it is a list: `views[2].mask`.
+        argument: String,
+        /// What was found there.
+        found: String,
+        /// What would have been accepted.
+        allowed: String,
+    },
+    /// A file's content is not what its format promises.
+    #[error("{}: {field}: {reason}", path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// The field, record or key in it.
+        field: String,
+        /// What is wrong with it, and what is expected.
+        reason: String,
+    },
+    /// The operating system refused a file operation.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's own words.
+        source: std::io::Error,
+    },
+    /// The input is well formed, but this method cannot make a vehicle of it.
+    #[error("{stage}: {reason}")]
+    Reconstruction {
+        /// The stage that gave up.
+        stage: &'static str,
+        /// Why, and what would help.
+        reason: String,
+    },
+    /// The progress callback asked to stop.
+    #[error("cancelled during {stage}")]
+    Cancelled {
+        /// The stage that was running.
+        stage: &'static str,
+    },
+}
+
+impl Error {
+    /// An argument error; see [`Error::Argument`].
+    pub fn argument(
+        argument: impl Into<String>,
+        found: impl Into<String>,
+        allowed: impl Into<String>,
+    ) -> Self {
+        Self::Argument { argument: argument.into(), found: found.into(), allowed: allowed.into() }
+    }
+
+    /// A file-format error; see [`Error::Format`].
+    pub fn format(path: &Path, field: impl Into<String>, reason: impl Into<String>) -> Self {
+        Self::Format { path: path.to_owned(), field: field.into(), reason: reason.into() }
+    }
+
+    /// An I/O error with the path it concerns.
+    pub fn io(path: &Path, source: std::io::Error) -> Self {
+        Self::Io { path: path.to_owned(), source }
+    }
+}

@@ -1,0 +1,267 @@
+//! The Gaussians of one vehicle: mu, Sigma = R S S^T R^T, opacity, colour as spherical harmonics.
+
+use super::sh;
+use crate::error::{Error, Result};
+
+/// Smallest and largest standard deviation that is stored, metres (paper eq. `scale`).
+pub const SCALE_RANGE: std::ops::RangeInclusive<f32> = f32::MIN_POSITIVE..=1e9;
+
+/// Gaussians in the vehicle frame (x forward, y left, z up, metres), structure of arrays, f32.
+///
+/// Invariants, held by every constructor: all arrays have the same length, every number is finite, rotations
+/// are unit quaternions, scales are positive, opacities lie in [0, 1].
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Gaussians {
+    sh_degree: u8,
+    means: Vec<[f32; 3]>,
+    rotations: Vec<[f32; 4]>,
+    scales: Vec<[f32; 3]>,
+    opacities: Vec<f32>,
+    sh: Vec<f32>,
+}
+
+/// One Gaussian with colour of degree 0, as a head makes it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gaussian {
+    /// Centre, metres.
+    pub mean: [f32; 3],
+    /// `vehicle_from_gaussian`, unit quaternion (w, x, y, z).
+    pub rotation: [f32; 4],
+    /// Standard deviations along the Gaussian's own axes, metres.
+    pub scale: [f32; 3],
+    /// Peak opacity in [0, 1].
+    pub opacity: f32,
+    /// SH coefficients of degree 0, RGB.
+    pub sh0: [f32; 3],
+}
+
+impl Gaussians {
+    /// None yet, with room for `capacity`, colour of SH degree `sh_degree` (0 to 3).
+    pub fn with_capacity(sh_degree: u8, capacity: usize) -> Self {
+        assert!(sh_degree <= sh::MAX_DEGREE, "SH degree {sh_degree} is above {}", sh::MAX_DEGREE);
+        Self {
+            sh_degree,
+            means: Vec::with_capacity(capacity),
+            rotations: Vec::with_capacity(capacity),
+            scales: Vec::with_capacity(capacity),
+            opacities: Vec::with_capacity(capacity),
+            sh: Vec::with_capacity(capacity * sh::coefficients(sh_degree) * 3),
+        }
+    }
+
+    /// From arrays of n Gaussians. Quaternions (w, x, y, z) of any non-zero norm are normalised; everything
+    /// else that breaks an invariant is an error that names the array and the index.
+    ///
+    /// `means` `[n][3]` metres, `rotations` `[n][4]`, `scales` `[n][3]` standard deviations in metres,
+    /// `opacities` `[n]`, `sh` `[n][(sh_degree + 1)^2][3]` RGB innermost.
+    pub fn from_arrays(
+        sh_degree: u8,
+        means: Vec<[f32; 3]>,
+        mut rotations: Vec<[f32; 4]>,
+        scales: Vec<[f32; 3]>,
+        opacities: Vec<f32>,
+        sh: Vec<f32>,
+    ) -> Result<Self> {
+        if sh_degree > sh::MAX_DEGREE {
+            return Err(Error::argument("sh_degree", sh_degree.to_string(), "0 to 3"));
+        }
+        let n = means.len();
+        let per_gaussian = sh::coefficients(sh_degree) * 3;
+        let lengths = [
+            ("rotations", rotations.len(), n),
+            ("scales", scales.len(), n),
+            ("opacities", opacities.len(), n),
+            ("sh", sh.len(), n * per_gaussian),
+        ];
+        for (name, found, expected) in lengths {
+            if found != expected {
+                return Err(Error::argument(
+                    name,
+                    format!("{found} entries"),
+                    format!("{expected} for {n} means"),
+                ));
+            }
+        }
+        for (i, mean) in means.iter().enumerate() {
+            if !mean.iter().all(|v| v.is_finite()) {
+                return Err(Error::argument(format!("means[{i}]"), format!("{mean:?}"), "finite numbers"));
+            }
+        }
+        for (i, q) in rotations.iter_mut().enumerate() {
+            *q = normalize_quaternion(*q).ok_or_else(|| {
+                Error::argument(
+                    format!("rotations[{i}]"),
+                    format!("{q:?}"),
+                    "a finite quaternion that is not zero",
+                )
+            })?;
+        }
+        for (i, scale) in scales.iter().enumerate() {
+            if !scale.iter().all(|v| SCALE_RANGE.contains(v)) {
+                return Err(Error::argument(
+                    format!("scales[{i}]"),
+                    format!("{scale:?}"),
+                    "above 0, to 1e9 m",
+                ));
+            }
+        }
+        for (i, opacity) in opacities.iter().enumerate() {
+            if !(0.0..=1.0).contains(opacity) {
+                return Err(Error::argument(format!("opacities[{i}]"), opacity.to_string(), "0 to 1"));
+            }
+        }
+        if let Some(i) = sh.iter().position(|v| !v.is_finite()) {
+            return Err(Error::argument(
+                format!("sh[{}]", i / per_gaussian),
+                sh[i].to_string(),
+                "finite numbers",
+            ));
+        }
+        Ok(Self { sh_degree, means, rotations, scales, opacities, sh })
+    }
+
+    /// Appends one Gaussian that meets the invariants; bands above degree 0 become zero.
+    pub fn push(&mut self, g: &Gaussian) {
+        debug_assert!(g.mean.iter().chain(&g.rotation).chain(&g.sh0).all(|v| v.is_finite()), "{g:?}");
+        debug_assert!(g.scale.iter().all(|v| SCALE_RANGE.contains(v)), "{g:?}");
+        self.means.push(g.mean);
+        self.rotations.push(g.rotation);
+        self.scales.push(g.scale);
+        self.opacities.push(g.opacity);
+        self.sh.extend_from_slice(&g.sh0);
+        let rest = (sh::coefficients(self.sh_degree) - 1) * 3;
+        self.sh.resize(self.sh.len() + rest, 0.0);
+    }
+
+    /// Appends all of `other`, which has the same SH degree.
+    pub fn append(&mut self, other: &Self) {
+        assert_eq!(self.sh_degree, other.sh_degree, "appending Gaussians of another SH degree");
+        self.means.extend_from_slice(&other.means);
+        self.rotations.extend_from_slice(&other.rotations);
+        self.scales.extend_from_slice(&other.scales);
+        self.opacities.extend_from_slice(&other.opacities);
+        self.sh.extend_from_slice(&other.sh);
+    }
+
+    /// Those with `keep(index)`, in order.
+    pub fn filtered(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let per_gaussian = self.sh_stride();
+        let mut out = Self::with_capacity(self.sh_degree, 0);
+        for i in (0..self.len()).filter(|&i| keep(i)) {
+            out.means.push(self.means[i]);
+            out.rotations.push(self.rotations[i]);
+            out.scales.push(self.scales[i]);
+            out.opacities.push(self.opacities[i]);
+            out.sh.extend_from_slice(&self.sh[i * per_gaussian..(i + 1) * per_gaussian]);
+        }
+        out
+    }
+
+    /// The arrays that mirroring changes: means, rotations, SH.
+    pub(super) fn arrays_mut(&mut self) -> (&mut [[f32; 3]], &mut [[f32; 4]], &mut [f32]) {
+        (&mut self.means, &mut self.rotations, &mut self.sh)
+    }
+
+    /// Appends a copy of all.
+    pub(super) fn duplicate(&mut self) {
+        self.means.extend_from_within(..);
+        self.rotations.extend_from_within(..);
+        self.scales.extend_from_within(..);
+        self.opacities.extend_from_within(..);
+        self.sh.extend_from_within(..);
+    }
+
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.means.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.means.is_empty()
+    }
+
+    /// Highest SH degree stored, 0 to 3.
+    pub fn sh_degree(&self) -> u8 {
+        self.sh_degree
+    }
+
+    /// Floats of SH per Gaussian: (degree + 1)^2 * 3.
+    pub fn sh_stride(&self) -> usize {
+        sh::coefficients(self.sh_degree) * 3
+    }
+
+    /// Centres in metres. `[n][3]`
+    pub fn means(&self) -> &[[f32; 3]] {
+        &self.means
+    }
+
+    /// `vehicle_from_gaussian`, unit quaternions (w, x, y, z). `[n][4]`
+    pub fn rotations(&self) -> &[[f32; 4]] {
+        &self.rotations
+    }
+
+    /// Standard deviations in metres. `[n][3]`
+    pub fn scales(&self) -> &[[f32; 3]] {
+        &self.scales
+    }
+
+    /// Peak opacities in [0, 1]. `[n]`
+    pub fn opacities(&self) -> &[f32] {
+        &self.opacities
+    }
+
+    /// SH coefficients, `[n][(degree + 1)^2][3]`, RGB innermost.
+    pub fn sh(&self) -> &[f32] {
+        &self.sh
+    }
+
+    /// Lowest and highest centre, metres, or `None` when empty.
+    pub fn bounds(&self) -> Option<([f32; 3], [f32; 3])> {
+        let first = *self.means.first()?;
+        Some(self.means.iter().fold((first, first), |(mut lo, mut hi), m| {
+            for k in 0..3 {
+                lo[k] = lo[k].min(m[k]);
+                hi[k] = hi[k].max(m[k]);
+            }
+            (lo, hi)
+        }))
+    }
+}
+
+/// The unit quaternion along `q`, or `None` for zero or non-finite ones. In f64, where the square of no finite
+/// f32 over- or underflows.
+pub fn normalize_quaternion(q: [f32; 4]) -> Option<[f32; 4]> {
+    let norm = q.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>().sqrt();
+    (norm > 0.0 && norm.is_finite()).then(|| q.map(|v| (f64::from(v) / norm) as f32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn one(rotation: [f32; 4], scale: [f32; 3], opacity: f32) -> Result<Gaussians> {
+        Gaussians::from_arrays(0, vec![[0.0; 3]], vec![rotation], vec![scale], vec![opacity], vec![0.0; 3])
+    }
+
+    #[test]
+    fn quaternions_of_norm_1e_minus_30_and_1e30_are_normalised_and_zero_is_refused() {
+        for scale in [1e-30f32, 1e30] {
+            let g = one([0.0, scale, 0.0, -scale], [1.0; 3], 1.0).unwrap();
+            let h = std::f32::consts::FRAC_1_SQRT_2;
+            assert_eq!(g.rotations()[0], [0.0, h, 0.0, -h]);
+        }
+        assert!(one([0.0; 4], [1.0; 3], 1.0).unwrap_err().to_string().starts_with("rotations[0]"));
+    }
+
+    #[test]
+    fn each_broken_invariant_is_an_error_that_names_the_array() {
+        let unit = [1.0, 0.0, 0.0, 0.0];
+        assert!(one(unit, [1.0, 0.0, 1.0], 1.0).unwrap_err().to_string().starts_with("scales[0]"));
+        assert!(one(unit, [1.0; 3], 1.5).unwrap_err().to_string().starts_with("opacities[0]"));
+        assert!(one(unit, [f32::NAN; 3], 1.0).is_err());
+        assert!(one([f32::INFINITY, 0.0, 0.0, 0.0], [1.0; 3], 1.0).is_err());
+        assert!(Gaussians::from_arrays(4, vec![], vec![], vec![], vec![], vec![]).is_err());
+        assert!(Gaussians::from_arrays(0, vec![[0.0; 3]], vec![], vec![], vec![], vec![]).is_err());
+    }
+}

@@ -1,0 +1,7 @@
+//! 3D Gaussians as a structure of arrays, and the algebra on them that knows nothing of where they came from.
+
+pub mod buffer;
+pub mod mirror;
+pub mod sh;
+
+pub use buffer::Gaussians;

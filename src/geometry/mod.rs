@@ -1,0 +1,18 @@
+//! Cameras, poses and frames, in f64.
+//!
+//! * Vehicle frame: x forward, y left, z up, metres, right-handed; the symmetry plane is y = 0.
+//! * Camera frame: x right, y down, z forward (OpenCV, COLMAP).
+//! * The pixel in column u, row v has its centre at (u + 0.5, v + 0.5) (COLMAP).
+//! * A transform is named `to_from`: `vehicle_from_camera` takes camera points to vehicle points.
+//! * Quaternions are (w, x, y, z), Hamilton.
+
+pub mod align;
+pub mod camera;
+pub mod distortion;
+pub mod frame;
+pub mod pose;
+
+pub use align::Similarity;
+pub use camera::{Camera, CameraModel, Intrinsics};
+pub use distortion::Distortion;
+pub use pose::Pose;

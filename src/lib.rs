@@ -1,0 +1,23 @@
+//! Vehicle Gaussians: a few posed, masked photographs of one side of a vehicle in, a complete metric
+//! 3D Gaussian model out, rendered from any camera.
+//!
+//! Data flows one way: [`scene`] -> prior -> head -> symmetry -> [`gaussians`] -> [`render`].
+//!
+//! # Conventions
+//! * Vehicle frame: x forward, y left, z up, metres, right-handed; the symmetry plane is y = 0.
+//! * Camera frame: x right, y down, z forward. The top-left pixel's centre is (0.5, 0.5).
+//! * Transforms are named `to_from`; `vehicle_from_camera` is what every camera carries.
+//! * Quaternions are (w, x, y, z). Scales are standard deviations in metres, opacities lie in [0, 1].
+//! * Pictures are 8-bit sRGB and stay so encoded; row 0 is the top row.
+//! * Depth is planar z along the optical axis in metres; 0 means none.
+
+pub mod error;
+pub mod gaussians;
+pub mod geometry;
+pub mod render;
+pub mod scene;
+
+pub use error::{Error, Result};
+pub use gaussians::Gaussians;
+pub use geometry::{Camera, Pose};
+pub use scene::{Scene, View};

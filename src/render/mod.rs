@@ -1,0 +1,17 @@
+//! Alpha-blended splatting (method section 5): options, targets, and the renderers behind one trait.
+
+pub mod options;
+pub mod output;
+
+pub use options::{Background, DepthMode, RenderOptions};
+pub use output::Rendered;
+
+use crate::error::Result;
+use crate::gaussians::Gaussians;
+use crate::geometry::Camera;
+
+/// Draws Gaussians as a camera sees them.
+pub trait Renderer {
+    /// One picture. The camera may be distorted; it is validated.
+    fn render(&self, gaussians: &Gaussians, camera: &Camera, options: &RenderOptions) -> Result<Rendered>;
+}

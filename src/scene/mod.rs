@@ -1,0 +1,12 @@
+//! What a reconstruction starts from: views, each an image, a mask, a camera, and depth where it was measured.
+
+pub mod depth;
+pub mod image;
+pub mod mask;
+pub mod undistort;
+pub mod view;
+
+pub use depth::DepthMap;
+pub use image::{PixelFormat, RgbImage};
+pub use mask::Mask;
+pub use view::{Scene, View};

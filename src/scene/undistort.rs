@@ -1,0 +1,131 @@
+//! Views of distorted cameras resampled onto a pinhole that holds all they saw.
+//!
+//! Kernels know pinholes only. Pictures are resampled bilinearly, masks and depth by the nearest pixel (an edge
+//! between two depths is not a surface); pinhole pixels that the lens did not see are labelled unknown, so that
+//! nobody takes them for background.
+
+use super::mask::{Label, Mask};
+use super::{DepthMap, RgbImage, View};
+use crate::error::{Error, Result};
+use crate::geometry::{Camera, Distortion, Intrinsics};
+
+/// The pinhole may be this many times the source's width and height; wider corners are cut.
+const MAX_GROWTH: f64 = 2.0;
+
+/// The view on a pinhole grid; a pinhole view is returned as it is.
+pub fn undistorted(view: &View) -> Result<View> {
+    if view.camera.distortion.is_none() {
+        let camera = Camera { distortion: Distortion::None, ..view.camera };
+        return Ok(View { camera, ..view.clone() });
+    }
+    let camera = pinhole_for(&view.camera)?;
+    let map = source_pixels(&camera, &view.camera);
+    let inside = |p: &[f32; 2]| {
+        p[0] >= 0.0 && p[1] >= 0.0 && p[0] < view.camera.width as f32 && p[1] < view.camera.height as f32
+    };
+    let nearest = |p: &[f32; 2]| p[1] as usize * view.camera.width as usize + p[0] as usize;
+    let (width, height) = (camera.width, camera.height);
+
+    let pixels = map.iter().map(|p| if inside(p) { bilinear(&view.image, *p) } else { [0; 3] }).collect();
+    let labels = map
+        .iter()
+        .map(|p| match &view.mask {
+            _ if !inside(p) => Label::Unknown,
+            Some(mask) => mask.labels()[nearest(p)],
+            None => Label::Vehicle,
+        })
+        .collect();
+    let depth = match &view.depth {
+        None => None,
+        Some(depth) => {
+            let sample = |p: &[f32; 2]| if inside(p) { depth.depth()[nearest(p)] } else { 0.0 };
+            Some(DepthMap::new(width, height, map.iter().map(sample).collect())?)
+        }
+    };
+    Ok(View {
+        name: view.name.clone(),
+        camera,
+        image: RgbImage::new(width, height, pixels)?,
+        mask: view.mask.is_some().then(|| Mask::new(width, height, labels)).transpose()?,
+        depth,
+    })
+}
+
+/// A pinhole with the same focal lengths and pose whose image plane covers the source's picture.
+pub fn pinhole_for(source: &Camera) -> Result<Camera> {
+    let (w, h) = (f64::from(source.width), f64::from(source.height));
+    let i = source.intrinsics;
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    const SAMPLES: u32 = 64;
+    for k in 0..=SAMPLES {
+        let t = f64::from(k) / f64::from(SAMPLES);
+        for pixel in [[t * w, 0.0], [t * w, h], [0.0, t * h], [w, t * h], [t * w, 0.5 * h], [0.5 * w, t * h]]
+        {
+            if let Some(ray) = source.ray(pixel) {
+                let p = i.pixel_from_normalized([ray.x, ray.y]);
+                for axis in 0..2 {
+                    low[axis] = low[axis].min(p[axis]);
+                    high[axis] = high[axis].max(p[axis]);
+                }
+            }
+        }
+    }
+    if !(low[0] < high[0] && low[1] < high[1]) {
+        return Err(Error::argument(
+            "camera.distortion",
+            "no pixel has a ray in front of the camera",
+            "a lens model that can be inverted inside the picture",
+        ));
+    }
+    // Never beyond the allowed growth around the source's own frame, nor beyond what a camera may be.
+    let cap = |low: f64, high: f64, size: f64| {
+        let margin = 0.5 * (MAX_GROWTH - 1.0) * size;
+        let (low, high) = (low.max(-margin).floor(), high.min(size + margin).ceil());
+        (low, (high - low).clamp(1.0, f64::from(crate::geometry::camera::MAX_SIDE)))
+    };
+    let (x0, width) = cap(low[0], high[0], w);
+    let (y0, height) = cap(low[1], high[1], h);
+    Camera::pinhole(
+        width as u32,
+        height as u32,
+        Intrinsics { cx: i.cx - x0, cy: i.cy - y0, ..i },
+        source.vehicle_from_camera,
+    )
+}
+
+/// Position in the source's picture of every pixel centre of the pinhole, in row order.
+fn source_pixels(pinhole: &Camera, source: &Camera) -> Vec<[f32; 2]> {
+    let mut map = Vec::with_capacity(pinhole.width as usize * pinhole.height as usize);
+    for v in 0..pinhole.height {
+        for u in 0..pinhole.width {
+            let normalized =
+                pinhole.intrinsics.normalized_from_pixel([f64::from(u) + 0.5, f64::from(v) + 0.5]);
+            let distorted = source.distortion.distort(normalized);
+            // A polynomial that has folded back lands inside the picture though no light came that way.
+            let folded = source
+                .distortion
+                .undistort(distorted)
+                .is_none_or(|back| (back[0] - normalized[0]).hypot(back[1] - normalized[1]) > 1e-6);
+            let p = source.intrinsics.pixel_from_normalized(distorted);
+            map.push(if folded { [f32::NEG_INFINITY; 2] } else { p.map(|c| c as f32) });
+        }
+    }
+    map
+}
+
+/// Bilinear sample; pixel centres at (u + 0.5, v + 0.5), edges repeated.
+fn bilinear(image: &RgbImage, [x, y]: [f32; 2]) -> [u8; 3] {
+    let (x, y) = (x - 0.5, y - 0.5);
+    let (fx, fy) = (x - x.floor(), y - y.floor());
+    let at = |dx: i32, dy: i32| {
+        let u = (x.floor() as i32 + dx).clamp(0, image.width() as i32 - 1) as u32;
+        let v = (y.floor() as i32 + dy).clamp(0, image.height() as i32 - 1) as u32;
+        image.get(u, v).map(f32::from)
+    };
+    let (a, b, c, d) = (at(0, 0), at(1, 0), at(0, 1), at(1, 1));
+    std::array::from_fn(|k| {
+        let top = a[k] + (b[k] - a[k]) * fx;
+        let bottom = c[k] + (d[k] - c[k]) * fx;
+        (top + (bottom - top) * fy).round() as u8
+    })
+}

@@ -1,0 +1,75 @@
+//! A view and a scene, and what makes them valid.
+
+use super::{DepthMap, Mask, RgbImage};
+use crate::error::{Error, Result};
+use crate::geometry::Camera;
+
+/// Most views a scene may hold.
+pub const MAX_VIEWS: usize = 4096;
+
+/// One photograph: picture, camera, and which pixels show the vehicle.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// Name for messages and output files, for example the picture's file name.
+    pub name: String,
+    /// Intrinsics, distortion and `vehicle_from_camera`.
+    pub camera: Camera,
+    /// The picture, of the camera's size.
+    pub image: RgbImage,
+    /// Vehicle or not, of the camera's size; `None` where nobody said.
+    pub mask: Option<Mask>,
+    /// Measured planar depth in metres, of the camera's size.
+    pub depth: Option<DepthMap>,
+}
+
+/// Views of one vehicle in its own frame.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// In the caller's order.
+    pub views: Vec<View>,
+}
+
+impl View {
+    /// Camera valid, picture, mask and depth of the camera's size; `argument` names the view in the error.
+    pub fn validate(&self, argument: &str) -> Result<()> {
+        self.camera.validate(&format!("{argument}.camera"))?;
+        let expected = (self.camera.width, self.camera.height);
+        let same_size = |what: &str, width: u32, height: u32| {
+            if (width, height) == expected {
+                return Ok(());
+            }
+            Err(Error::argument(
+                format!("{argument}.{what}"),
+                format!("{width}x{height}"),
+                format!("the camera's size, {}x{}", expected.0, expected.1),
+            ))
+        };
+        same_size("image", self.image.width(), self.image.height())?;
+        if let Some(mask) = &self.mask {
+            same_size("mask", mask.width(), mask.height())?;
+        }
+        if let Some(depth) = &self.depth {
+            same_size("depth", depth.width(), depth.height())?;
+        }
+        Ok(())
+    }
+
+    /// How errors name view number `index`.
+    pub fn argument(&self, index: usize) -> String {
+        if self.name.is_empty() {
+            format!("views[{index}]")
+        } else {
+            format!("views[{index}] ({})", self.name)
+        }
+    }
+}
+
+impl Scene {
+    /// At least one view, all valid.
+    pub fn validate(&self) -> Result<()> {
+        if self.views.is_empty() || self.views.len() > MAX_VIEWS {
+            return Err(Error::argument("views", self.views.len().to_string(), format!("1 to {MAX_VIEWS}")));
+        }
+        self.views.iter().enumerate().try_for_each(|(i, view)| view.validate(&view.argument(i)))
+    }
+}
