@@ -14,8 +14,14 @@
 pub mod error;
 pub mod gaussians;
 pub mod geometry;
+pub mod head;
+pub mod metrics;
+pub mod pipeline;
+pub mod prior;
+pub mod progress;
 pub mod render;
 pub mod scene;
+pub mod symmetry;
 
 pub use error::{Error, Result};
 pub use gaussians::Gaussians;

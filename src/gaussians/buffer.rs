@@ -133,6 +133,13 @@ impl Gaussians {
         self.sh.resize(self.sh.len() + rest, 0.0);
     }
 
+    /// Appends one Gaussian that meets the invariants with all its coefficients, `[(degree + 1)^2][3]`.
+    pub fn push_with_sh(&mut self, g: &Gaussian, sh: &[f32]) {
+        self.push(g);
+        let start = self.sh.len() - self.sh_stride();
+        self.sh[start..].copy_from_slice(sh);
+    }
+
     /// Appends all of `other`, which has the same SH degree.
     pub fn append(&mut self, other: &Self) {
         assert_eq!(self.sh_degree, other.sh_degree, "appending Gaussians of another SH degree");

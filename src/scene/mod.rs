@@ -5,6 +5,7 @@ pub mod image;
 pub mod mask;
 pub mod undistort;
 pub mod view;
+pub mod visibility;
 
 pub use depth::DepthMap;
 pub use image::{PixelFormat, RgbImage};

@@ -114,7 +114,7 @@ fn source_pixels(pinhole: &Camera, source: &Camera) -> Vec<[f32; 2]> {
 }
 
 /// Bilinear sample; pixel centres at (u + 0.5, v + 0.5), edges repeated.
-fn bilinear(image: &RgbImage, [x, y]: [f32; 2]) -> [u8; 3] {
+pub(crate) fn bilinear(image: &RgbImage, [x, y]: [f32; 2]) -> [u8; 3] {
     let (x, y) = (x - 0.5, y - 0.5);
     let (fx, fy) = (x - x.floor(), y - y.floor());
     let at = |dx: i32, dy: i32| {

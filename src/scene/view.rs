@@ -3,6 +3,7 @@
 use super::{DepthMap, Mask, RgbImage};
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
+use glam::{DVec3, Vec3};
 
 /// Most views a scene may hold.
 pub const MAX_VIEWS: usize = 4096;
@@ -52,6 +53,15 @@ impl View {
             same_size("depth", depth.width(), depth.height())?;
         }
         Ok(())
+    }
+
+    /// The point at planar depth `z` metres behind the centre of pixel (u, v) of a pinhole view, vehicle frame
+    /// (paper eqs. `metric_point_ray`, `vehicle_point`).
+    pub fn lift(&self, u: u32, v: u32, z: f32) -> Vec3 {
+        let pixel = [f64::from(u) + 0.5, f64::from(v) + 0.5];
+        let [x, y] = self.camera.intrinsics.normalized_from_pixel(pixel);
+        let point_camera = DVec3::new(x, y, 1.0) * f64::from(z);
+        self.camera.vehicle_from_camera.transform_point(point_camera).as_vec3()
     }
 
     /// How errors name view number `index`.

@@ -1,0 +1,101 @@
+//! Colour of a surfel from all views that see it, as spherical harmonics.
+//!
+//! Geometry is never exact and paint is glossy, so the same place looks different from different sides. A mean
+//! over views blurs, one view alone is wrong seen from elsewhere; spherical harmonics can hold both: seen from
+//! near view j's direction the surfel shows view j's colour. The coefficients are the posterior mean of a
+//! Gaussian process on the sphere: colour = mean + sum over bands l >= 1 with equal prior power per band, and
+//! noise inversely proportional to each view's weight. With n views this is one n x n solve per surfel.
+
+use crate::gaussians::sh;
+use glam::Vec3;
+
+/// Most views that take part in one surfel's colour; more add nothing that three bands can hold.
+pub const MAX_SAMPLES: usize = 8;
+
+/// Noise variance of a view of weight 1 over the prior variance of the view-dependent part.
+const NOISE: f64 = 0.3;
+
+/// What one view shows of a surfel.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sample {
+    /// Unit direction from the camera to the surfel, vehicle frame.
+    pub direction: Vec3,
+    /// RGB in [0, 1].
+    pub color: Vec3,
+    /// Trust, 0 to 1.
+    pub weight: f32,
+}
+
+/// SH coefficients `[16][3]` up to `degree` that show the samples' colours in their directions.
+pub fn fit(samples: &[Sample], degree: u8) -> [f32; 48] {
+    let samples = &samples[..samples.len().min(MAX_SAMPLES)];
+    let mut out = [0.0f32; 48];
+    let total: f32 = samples.iter().map(|s| s.weight).sum();
+    if total <= 0.0 {
+        return out;
+    }
+    let mean = samples.iter().map(|s| s.color * s.weight).sum::<Vec3>() / total;
+    out[..3].copy_from_slice(&sh::from_rgb(mean.to_array()));
+    if degree == 0 || samples.len() < 2 {
+        return out;
+    }
+    let n = samples.len();
+    let prior = band_variances(degree);
+    let mut basis = [[0.0f64; 16]; MAX_SAMPLES];
+    for (b, s) in basis.iter_mut().zip(samples) {
+        *b = sh::basis(s.direction.as_dvec3().to_array(), degree);
+    }
+    let coefficients = sh::coefficients(degree);
+    let mut k = [[0.0f64; MAX_SAMPLES]; MAX_SAMPLES];
+    for i in 0..n {
+        for j in 0..=i {
+            let covariance: f64 = (1..coefficients).map(|c| prior[c] * basis[i][c] * basis[j][c]).sum();
+            k[i][j] = covariance;
+            k[j][i] = covariance;
+        }
+        k[i][i] += NOISE / f64::from(samples[i].weight).max(1e-3);
+    }
+    let mut residual = [[0.0f64; 3]; MAX_SAMPLES];
+    for (r, s) in residual.iter_mut().zip(samples) {
+        *r = (s.color - mean).as_dvec3().to_array();
+    }
+    solve_in_place(&mut k, &mut residual, n);
+    for c in 1..coefficients {
+        for channel in 0..3 {
+            let sum: f64 = (0..n).map(|i| residual[i][channel] * basis[i][c]).sum();
+            out[3 * c + channel] = (prior[c] * sum) as f32;
+        }
+    }
+    out
+}
+
+/// Prior variance per coefficient: the same power in each band, total variance 1 in any direction.
+fn band_variances(degree: u8) -> [f64; 16] {
+    let mut variances = [0.0; 16];
+    for l in 1..=usize::from(degree) {
+        // sum over m of Y_lm^2 = (2 l + 1) / 4 pi
+        let power = (2 * l + 1) as f64 / (4.0 * std::f64::consts::PI);
+        variances[l * l..(l + 1) * (l + 1)].fill(1.0 / (f64::from(degree) * power));
+    }
+    variances
+}
+
+/// Solves K x = b for symmetric positive definite K (Cholesky), overwriting b with x.
+fn solve_in_place(k: &mut [[f64; MAX_SAMPLES]; MAX_SAMPLES], b: &mut [[f64; 3]; MAX_SAMPLES], n: usize) {
+    for i in 0..n {
+        for j in 0..=i {
+            let sum: f64 = k[i][j] - (0..j).map(|m| k[i][m] * k[j][m]).sum::<f64>();
+            k[i][j] = if i == j { sum.max(1e-12).sqrt() } else { sum / k[j][j] };
+        }
+    }
+    for channel in 0..3 {
+        for i in 0..n {
+            let sum: f64 = (0..i).map(|m| k[i][m] * b[m][channel]).sum();
+            b[i][channel] = (b[i][channel] - sum) / k[i][i];
+        }
+        for i in (0..n).rev() {
+            let sum: f64 = (i + 1..n).map(|m| k[m][i] * b[m][channel]).sum();
+            b[i][channel] = (b[i][channel] - sum) / k[i][i];
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! The main job: scene in, vehicle out, with a plan of what the scene needs and a report of what was done.
+
+pub mod options;
+pub mod plan;
+pub mod report;
+pub mod run;
+
+pub use options::{Keep, Options, PriorChoice};
+pub use report::{InputError, LeftOut, Report, Stage};
+pub use run::{Reconstruction, reconstruct};

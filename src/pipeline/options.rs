@@ -1,0 +1,86 @@
+//! What a caller may choose; `Options::default()` is what everything is measured with.
+
+use crate::error::{Error, Result};
+use crate::symmetry::SymmetryMode;
+use serde::Serialize;
+
+/// Which depth source.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PriorChoice {
+    /// `Given` if every used view has depth, else the best prior without: `Hull`.
+    #[default]
+    Auto,
+    /// The caller's metric depth.
+    Given,
+    /// The visual hull of the silhouettes and their mirrored twins.
+    Hull,
+}
+
+/// What the plan would leave out, kept nevertheless; all `false` by default.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
+pub struct Keep {
+    /// Views whose camera another view already has.
+    pub duplicate_views: bool,
+    /// Pixels that another view shows at a higher resolution.
+    pub overlap: bool,
+    /// Pixels on the silhouette's edge.
+    pub silhouette_edge: bool,
+    /// Floating pixels at depth edges.
+    pub floaters: bool,
+    /// SH bands that the spread of viewing directions cannot support.
+    pub sh_bands: bool,
+}
+
+/// Settings of a reconstruction.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Options {
+    /// Depth source.
+    pub prior: PriorChoice,
+    /// When Gaussians are cloned across y = 0.
+    pub symmetry: SymmetryMode,
+    /// Length, width, height in metres, where known.
+    pub vehicle_size: Option<[f64; 3]>,
+    /// Highest SH degree of the colour, 0 to 3.
+    pub sh_degree: u8,
+    /// What the plan may not leave out.
+    pub keep: Keep,
+    /// Worker threads; 0 means one per core.
+    pub threads: usize,
+    /// Whether to return the metric coloured point cloud as well.
+    pub points: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            prior: PriorChoice::Auto,
+            symmetry: SymmetryMode::Auto,
+            vehicle_size: None,
+            sh_degree: 2,
+            keep: Keep::default(),
+            threads: 0,
+            points: false,
+        }
+    }
+}
+
+impl Options {
+    /// Each field in its range.
+    pub fn validate(&self) -> Result<()> {
+        if let Some(size) = self.vehicle_size {
+            const SIZE_M: std::ops::RangeInclusive<f64> = 0.1..=30.0;
+            if !size.iter().all(|s| SIZE_M.contains(s)) {
+                return Err(Error::argument(
+                    "options.vehicle_size",
+                    format!("{size:?}"),
+                    "length, width, height, each 0.1 to 30 m",
+                ));
+            }
+        }
+        if self.sh_degree > crate::gaussians::sh::MAX_DEGREE {
+            return Err(Error::argument("options.sh_degree", self.sh_degree.to_string(), "0 to 3"));
+        }
+        Ok(())
+    }
+}

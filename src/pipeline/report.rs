@@ -1,0 +1,125 @@
+//! What a reconstruction did, how long it took, what it left out, and the error it can know.
+
+use super::options::Options;
+use crate::prior::{BoxSource, VehicleBox};
+use crate::symmetry::Completion;
+use serde::Serialize;
+use std::time::Instant;
+
+/// One stage of the run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Stage {
+    /// plan, undistort, prior, pixels, head, symmetry, check.
+    pub name: &'static str,
+    /// Wall time, milliseconds.
+    pub ms: f64,
+}
+
+/// Something the scene did not need.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct LeftOut {
+    /// What: views, pixels, SH bands, clones.
+    pub what: String,
+    /// Why it is not needed.
+    pub why: String,
+    /// How many.
+    pub count: usize,
+}
+
+/// The model rendered back into the input views, against the masked photographs on white.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct InputError {
+    /// Mean over the used views, full frame, dB.
+    pub psnr_db: f64,
+    /// Mean over the used views: alpha >= 0.5 against the mask.
+    pub silhouette_iou: f64,
+}
+
+/// The box the prior worked in.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BoxReport {
+    /// `given` or `estimated`.
+    pub source: BoxSource,
+    /// Length, width, height in metres.
+    pub size_m: [f64; 3],
+    /// Lowest corner, metres.
+    pub low_m: [f64; 3],
+}
+
+impl From<VehicleBox> for BoxReport {
+    fn from(b: VehicleBox) -> Self {
+        Self { source: b.source, size_m: b.size(), low_m: b.low }
+    }
+}
+
+/// The whole report; `serde_json` writes it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Version of this library.
+    pub version: &'static str,
+    /// Depth source that was used.
+    pub prior: &'static str,
+    /// Gaussian head that was used.
+    pub head: &'static str,
+    /// Wall time of each stage, in order.
+    pub stages: Vec<Stage>,
+    /// Wall time of the whole call, milliseconds.
+    pub total_ms: f64,
+    /// Highest resident memory of the process so far, bytes; `None` where the system does not tell.
+    pub peak_rss_bytes: Option<u64>,
+    /// Worker threads.
+    pub threads: usize,
+    /// Gaussians in the result.
+    pub gaussians: usize,
+    /// SH degree of the result.
+    pub sh_degree: u8,
+    /// Lowest and highest centre, metres.
+    pub extent_m: Option<([f32; 3], [f32; 3])>,
+    /// Names of the views that were used.
+    pub views_used: Vec<String>,
+    /// The box the prior worked in.
+    #[serde(rename = "box")]
+    pub vehicle_box: Option<BoxReport>,
+    /// Work this scene did not need.
+    pub left_out: Vec<LeftOut>,
+    /// How the unseen side was completed.
+    pub symmetry: Completion,
+    /// Error on the input views.
+    pub input_error: InputError,
+    /// The options of the call.
+    pub settings: Options,
+}
+
+/// Times the stages.
+pub(super) struct Clock {
+    start: Instant,
+    last: Instant,
+    stages: Vec<Stage>,
+}
+
+impl Clock {
+    pub(super) fn start() -> Self {
+        let now = Instant::now();
+        Self { start: now, last: now, stages: Vec::new() }
+    }
+
+    /// Ends the stage that has run since the last call.
+    pub(super) fn lap(&mut self, name: &'static str) {
+        let now = Instant::now();
+        self.stages.push(Stage { name, ms: (now - self.last).as_secs_f64() * 1e3 });
+        self.last = now;
+    }
+
+    pub(super) fn finish(self) -> (Vec<Stage>, f64) {
+        let total = self.start.elapsed().as_secs_f64() * 1e3;
+        (self.stages, total)
+    }
+}
+
+/// Highest resident memory of this process, bytes, from Linux's own account of it.
+pub(super) fn peak_rss_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib * 1024)
+}

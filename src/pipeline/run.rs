@@ -1,0 +1,171 @@
+//! The run: plan -> undistort -> prior -> pixels -> head -> symmetry -> check.
+
+use super::options::{Options, PriorChoice};
+use super::plan;
+use super::report::{Clock, InputError, Report, peak_rss_bytes};
+use crate::error::{Error, Result};
+use crate::gaussians::Gaussians;
+use crate::head::{GaussianHead, SurfelHead};
+use crate::metrics;
+use crate::prior::{DepthPrior, Geometry, GivenDepth, HullPrior};
+use crate::progress::{Context, ProgressCallback};
+use crate::render::{CpuRenderer, RenderOptions, Renderer};
+use crate::scene::visibility::{Observer, Sight};
+use crate::scene::{Scene, View, undistort};
+use crate::symmetry::{self, SymmetryMode};
+use glam::Vec3;
+
+/// A finished reconstruction.
+#[derive(Clone, Debug)]
+pub struct Reconstruction {
+    /// The vehicle.
+    pub gaussians: Gaussians,
+    /// The metric coloured point cloud (paper eq. for P), if asked for: positions in metres and 8-bit colours.
+    pub points: Option<PointCloud>,
+    /// What was done.
+    pub report: Report,
+}
+
+/// Points in the vehicle frame with their colours.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PointCloud {
+    /// Metres. `[n][3]`
+    pub positions: Vec<[f32; 3]>,
+    /// sRGB. `[n][3]`
+    pub colors: Vec<[u8; 3]>,
+}
+
+/// Reconstructs the vehicle of `scene`. `progress` is called on this thread at every stage boundary and inside
+/// the long stages; if it breaks, the call returns [`Error::Cancelled`].
+pub fn reconstruct<'a>(
+    scene: &Scene,
+    options: &Options,
+    progress: &'a mut ProgressCallback<'a>,
+) -> Result<Reconstruction> {
+    options.validate()?;
+    scene.validate()?;
+    let context = Context::new(options.threads, progress)?;
+    let mut clock = Clock::start();
+
+    context.report("plan", 0.0)?;
+    let (used, mut left_out) = plan::views(scene, &options.keep)?;
+    clock.lap("plan");
+
+    context.report("undistort", 0.0)?;
+    let views = undistorted(scene, &used, &context)?;
+    clock.lap("undistort");
+
+    context.report("prior", 0.0)?;
+    let prior = chosen_prior(plan::prior(&views, options), options);
+    let mut geometry = prior.estimate(&views, &context)?;
+    geometry.find_normals(&views, &context);
+    clock.lap("prior");
+
+    context.report("pixels", 0.0)?;
+    let kept = context.parallel(|| plan::pixels(&views, &geometry, &options.keep, &mut left_out));
+    let points = options.points.then(|| point_cloud(&views, &geometry));
+    clock.lap("pixels");
+
+    context.report("head", 0.0)?;
+    let head = SurfelHead::new(plan::sh_degree(&views, options, &mut left_out));
+    let gaussians = head.predict(&views, &geometry, &kept, &context)?;
+    if gaussians.is_empty() {
+        return Err(Error::Reconstruction {
+            stage: "head",
+            reason: "no vehicle pixel has depth; check that masks and depth overlap".into(),
+        });
+    }
+    clock.lap("head");
+
+    context.report("symmetry", 0.0)?;
+    let (gaussians, completion) =
+        context.parallel(|| complete(gaussians, options.symmetry, &views, &geometry));
+    plan::note(&mut left_out, "clones", "the mirrored place was observed by a view", completion.not_needed);
+    clock.lap("symmetry");
+
+    let input_error = input_error(&gaussians, &views, &context)?;
+    clock.lap("check");
+
+    let (stages, total_ms) = clock.finish();
+    let report = Report {
+        version: env!("CARGO_PKG_VERSION"),
+        prior: prior.name(),
+        head: head.name(),
+        stages,
+        total_ms,
+        peak_rss_bytes: peak_rss_bytes(),
+        threads: context.threads(),
+        gaussians: gaussians.len(),
+        sh_degree: gaussians.sh_degree(),
+        extent_m: gaussians.bounds(),
+        views_used: views.iter().map(|v| v.name.clone()).collect(),
+        vehicle_box: geometry.vehicle_box.map(Into::into),
+        left_out,
+        symmetry: completion,
+        input_error,
+        settings: options.clone(),
+    };
+    Ok(Reconstruction { gaussians, points, report })
+}
+
+fn undistorted(scene: &Scene, used: &[usize], context: &Context) -> Result<Vec<View>> {
+    use rayon::prelude::*;
+    context.parallel(|| used.par_iter().map(|&i| undistort::undistorted(&scene.views[i])).collect())
+}
+
+fn chosen_prior(choice: PriorChoice, options: &Options) -> Box<dyn DepthPrior> {
+    match choice {
+        PriorChoice::Given => Box::new(GivenDepth),
+        PriorChoice::Hull | PriorChoice::Auto => Box::new(HullPrior { size: options.vehicle_size }),
+    }
+}
+
+/// Every vehicle pixel with depth, lifted (paper eqs. `metric_point_ray`, `vehicle_point`).
+fn point_cloud(views: &[View], geometry: &Geometry) -> PointCloud {
+    let mut cloud = PointCloud::default();
+    for (view, depth) in views.iter().zip(&geometry.depths) {
+        for (v, u) in (0..view.camera.height).flat_map(|v| (0..view.camera.width).map(move |u| (v, u))) {
+            if view.mask.as_ref().is_none_or(|m| m.is_vehicle(u, v)) {
+                if let Some(z) = depth.get(u, v) {
+                    cloud.positions.push(view.lift(u, v, z).to_array());
+                    cloud.colors.push(view.image.get(u, v));
+                }
+            }
+        }
+    }
+    cloud
+}
+
+/// Cloning; in `Auto` a mirror image is not needed where a view saw its place: a surface, or nothing.
+fn complete(
+    gaussians: Gaussians,
+    mode: SymmetryMode,
+    views: &[View],
+    geometry: &Geometry,
+) -> (Gaussians, symmetry::Completion) {
+    /// Depth from different views agrees to about this, metres.
+    const SURFACE_M: f32 = 0.06;
+    let observers: Vec<Observer> =
+        views.iter().zip(&geometry.depths).map(|(v, d)| Observer::new(v, d)).collect();
+    let cameras: Vec<_> = views.iter().map(|v| v.camera).collect();
+    let means = gaussians.means().to_vec();
+    symmetry::complete(gaussians, mode, &cameras, |i| {
+        let [x, y, z] = means[i];
+        let place = Vec3::new(x, -y, z);
+        observers.iter().any(|o| !matches!(o.sight(place, SURFACE_M), Sight::Silent))
+    })
+}
+
+/// The model drawn into the views it came from.
+fn input_error(gaussians: &Gaussians, views: &[View], context: &Context) -> Result<InputError> {
+    let renderer = CpuRenderer::new();
+    let (mut psnr, mut iou) = (0.0, 0.0);
+    for (i, view) in views.iter().enumerate() {
+        context.report("check", i as f64 / views.len() as f64)?;
+        let rendered =
+            context.parallel(|| renderer.render(gaussians, &view.camera, &RenderOptions::default()))?;
+        psnr += metrics::psnr(&rendered.color, &metrics::on_white(view)) / views.len() as f64;
+        iou += metrics::silhouette_iou(&rendered.alpha, view) / views.len() as f64;
+    }
+    Ok(InputError { psnr_db: psnr, silhouette_iou: iou })
+}

@@ -1,0 +1,165 @@
+//! The box the vehicle stands in, from its silhouettes alone.
+
+use super::field::Field;
+use super::silhouette::{Silhouette, central_ray};
+use crate::error::{Error, Result};
+use crate::prior::{BoxSource, VehicleBox};
+use crate::scene::View;
+use glam::{DMat3, DVec3, Vec3};
+use rayon::prelude::*;
+
+/// Road vehicles are no larger than this, metres (length of an articulated bus, width and height of a lorry
+/// with its mirrors); silhouettes that do not bound an axis stop here or at the proportions below.
+const LARGEST_M: DVec3 = DVec3::new(19.0, 3.0, 4.5);
+
+/// Wider than this part of its length a vehicle is not (a city car), unless it is short.
+const WIDTH_OVER_LENGTH: f64 = 0.46;
+
+/// Every vehicle may be this wide, metres.
+const NARROWEST_LIMIT_M: f64 = 1.7;
+
+/// Grid points along the longest axis of the search.
+const SEARCH_POINTS: f64 = 72.0;
+
+/// Finds the box by carving twice, coarsely: first a cube around where the views look, then what was left.
+pub(super) fn estimate_box(views: &[View], inside: impl Fn(Vec3) -> f32 + Sync) -> Result<VehicleBox> {
+    let center = meeting_point(views);
+    let radius = search_radius(views, center)?;
+    let y = radius.min(0.5 * LARGEST_M.y);
+    let mut low = DVec3::new(center.x - radius, -y, center.z - radius);
+    let mut high = DVec3::new(center.x + radius, y, center.z + radius);
+    for _ in 0..3 {
+        let voxel = ((high - low).max_element() / SEARCH_POINTS).max(0.02);
+        let field = Field::carve(low, high, voxel, &inside);
+        // A grid point may miss a sliver of hull that is thinner than the spacing.
+        let Some(bounds) = field.bounds_above(-0.5 * voxel as f32) else {
+            return Err(Error::Reconstruction {
+                stage: "prior",
+                reason: "the silhouettes and their mirror images meet nowhere; check the poses (camera to \
+                         vehicle, x forward, y left, z up, symmetry plane y = 0) and the masks"
+                    .into(),
+            });
+        };
+        let margin = DVec3::splat(voxel);
+        low = (bounds.0 - margin).max(low);
+        high = (bounds.1 + margin).min(high);
+        let length = high.x - low.x;
+        let half_width = (0.5 * WIDTH_OVER_LENGTH * length).max(0.5 * NARROWEST_LIMIT_M);
+        (low.y, high.y) = (low.y.max(-half_width), high.y.min(half_width));
+    }
+    if let Some(half_width) = half_width_at_the_wheels(low, high, &inside) {
+        (low.y, high.y) = (low.y.max(-half_width), high.y.min(half_width));
+    }
+    let size = high - low;
+    if size.cmpgt(LARGEST_M * 1.2).any() {
+        return Err(Error::Reconstruction {
+            stage: "prior",
+            reason: format!(
+                "the silhouettes bound a box of {:.1} x {:.1} x {:.1} m, larger than any road vehicle; check \
+                 that poses are metric and in the vehicle frame, or pass the box",
+                size.x, size.y, size.z
+            ),
+        });
+    }
+    Ok(VehicleBox { low: low.to_array(), high: high.to_array(), source: BoxSource::Estimated })
+}
+
+/// Half the width where the vehicle stands on the ground, or `None` if nothing stands.
+///
+/// A few silhouettes at one height bound the flanks loosely (the hull bulges by decimetres) but the tyres
+/// tightly: cameras above the ground see the gap below the sills, so near the ground the hull ends a few
+/// centimetres beside the outer faces of the wheels. Bodies are flush with their wheels to a few centimetres;
+/// only mirrors stick out.
+fn half_width_at_the_wheels(low: DVec3, high: DVec3, inside: impl Fn(Vec3) -> f32 + Sync) -> Option<f64> {
+    const SLICE_M: f64 = 0.02;
+    const STEP_M: f64 = 0.03;
+    /// A wheel is taller than this; a bulge of the hull below the ground is not.
+    const WHEEL_M: f64 = 0.16;
+    let slices = ((0.6 * (high.z - low.z)).min(0.8) / SLICE_M) as usize;
+    let columns = ((high.x - low.x) / STEP_M) as usize;
+    let rows = (high.y / STEP_M) as usize;
+    let half_width = |slice: usize| {
+        let z = low.z + slice as f64 * SLICE_M;
+        let occupied = |y: f64| {
+            (0..=columns).any(|i| {
+                let x = low.x + i as f64 * STEP_M;
+                let p = DVec3::new(x, y, z).as_vec3();
+                inside(p) > 0.0 && inside(Vec3::new(p.x, -p.y, p.z)) > 0.0
+            })
+        };
+        (0..=rows).rev().map(|j| j as f64 * STEP_M).find(|&y| occupied(y)).unwrap_or(0.0)
+    };
+    let widths: Vec<f64> = (0..slices).into_par_iter().map(half_width).collect();
+    let above = (WHEEL_M / SLICE_M) as usize;
+    let ground = (0..slices.saturating_sub(above))
+        .find(|&k| widths[k] > 0.4 && widths[k] > 0.85 * widths[k + above])?;
+    Some(widths[ground + 2] + 0.5 * STEP_M)
+}
+
+/// The point nearest to all central rays and their mirror images; it lies on y = 0. Views that all look along
+/// x leave the distance open: a weak pull to the origin of the vehicle frame closes it.
+fn meeting_point(views: &[View]) -> DVec3 {
+    const PULL: f64 = 1e-3;
+    let mut normal = DMat3::from_diagonal(DVec3::splat(PULL));
+    let mut right = DVec3::ZERO;
+    for view in views {
+        let Some(bounds) = view.mask.as_ref().and_then(crate::scene::Mask::bounds) else { continue };
+        let (origin, direction) = central_ray(&view.camera, bounds);
+        for side in [1.0, -1.0] {
+            let flip = DVec3::new(1.0, side, 1.0);
+            let (o, d) = (origin * flip, direction * flip);
+            let across = DMat3::IDENTITY - DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+            normal += across;
+            right += across * o;
+        }
+    }
+    let point = normal.inverse() * right;
+    DVec3::new(point.x, 0.0, point.z)
+}
+
+/// How far from the meeting point the vehicle can reach, metres.
+fn search_radius(views: &[View], center: DVec3) -> Result<f64> {
+    let mut radius: f64 = 0.0;
+    for view in views {
+        let Some([u0, v0, u1, v1]) = view.mask.as_ref().and_then(crate::scene::Mask::bounds) else {
+            continue;
+        };
+        let i = view.camera.intrinsics;
+        let across = (f64::from(u1 - u0 + 1) / i.fx).hypot(f64::from(v1 - v0 + 1) / i.fy);
+        let distance = (center - view.camera.center()).length();
+        let cut = u0 == 0 || v0 == 0 || u1 + 1 == view.camera.width || v1 + 1 == view.camera.height;
+        // Half the diagonal, a little more because the near end looks larger; a cut silhouette hides the rest.
+        radius = radius.max(distance * across * if cut { 1.2 } else { 0.65 });
+    }
+    if !(radius.is_finite() && radius > 0.0 && center.is_finite()) {
+        return Err(Error::Reconstruction {
+            stage: "prior",
+            reason: "the views do not look at a common place near the plane y = 0".into(),
+        });
+    }
+    Ok(radius.clamp(1.0, LARGEST_M.x))
+}
+
+/// The caller's size placed where the silhouettes are: same middle along x, same ground.
+pub(super) fn place_box(size: [f64; 3], estimated: &VehicleBox) -> VehicleBox {
+    let middle = 0.5 * (estimated.low[0] + estimated.high[0]);
+    let ground = estimated.low[2];
+    VehicleBox {
+        low: [middle - 0.5 * size[0], -0.5 * size[1], ground],
+        high: [middle + 0.5 * size[0], 0.5 * size[1], ground + size[2]],
+        source: BoxSource::Given,
+    }
+}
+
+/// How far inside the box `p` is, metres.
+pub(super) fn inside_box(vehicle_box: &VehicleBox, p: Vec3) -> f32 {
+    let p = p.to_array();
+    (0..3)
+        .map(|k| (p[k] - vehicle_box.low[k] as f32).min(vehicle_box.high[k] as f32 - p[k]))
+        .fold(f32::INFINITY, f32::min)
+}
+
+/// All silhouettes' verdict: how far inside all cones.
+pub(super) fn inside_all(silhouettes: &[Silhouette], p: Vec3) -> f32 {
+    silhouettes.iter().map(|s| s.inside(p)).fold(f32::INFINITY, f32::min)
+}

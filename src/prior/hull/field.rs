@@ -1,0 +1,96 @@
+//! A scalar field on a regular grid, symmetric about y = 0, sampled trilinearly.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// Values are clamped to this, metres: beyond it only the sign matters.
+const CLAMP_M: f32 = 1.0;
+
+/// How far inside the hull each grid point is, metres, negative outside.
+pub(super) struct Field {
+    low: Vec3,
+    voxel: f32,
+    /// Points along x, y, z.
+    size: [usize; 3],
+    /// x fastest. `[nz][ny][nx]`
+    values: Vec<f32>,
+}
+
+impl Field {
+    /// Evaluates `inside` at the points of a grid of spacing `voxel` over the box `low..high`, which is
+    /// symmetric in y, and at their mirror points, keeping the smaller value (the mirrored twins carve too).
+    pub(super) fn carve(low: DVec3, high: DVec3, voxel: f64, inside: impl Fn(Vec3) -> f32 + Sync) -> Self {
+        let size: [usize; 3] = std::array::from_fn(|k| ((high[k] - low[k]) / voxel).ceil() as usize + 1);
+        let [nx, ny, nz] = size;
+        let half_width = 0.5 * (ny - 1) as f64 * voxel;
+        let low = Vec3::new(low.x as f32, -half_width as f32, low.z as f32);
+        let voxel = voxel as f32;
+        let mut values = vec![0.0f32; nx * ny * nz];
+        values.par_chunks_mut(nx * ny).enumerate().for_each(|(k, slab)| {
+            for (j, row) in slab.chunks_exact_mut(nx).enumerate() {
+                for (i, value) in row.iter_mut().enumerate() {
+                    let p = low + voxel * Vec3::new(i as f32, j as f32, k as f32);
+                    *value = inside(p).clamp(-CLAMP_M, CLAMP_M);
+                }
+            }
+            // The twin of column j is column ny - 1 - j.
+            for j in 0..ny / 2 {
+                for i in 0..nx {
+                    let (a, b) = (j * nx + i, (ny - 1 - j) * nx + i);
+                    let both = slab[a].min(slab[b]);
+                    (slab[a], slab[b]) = (both, both);
+                }
+            }
+        });
+        debug_assert_eq!(values.len(), nx * ny * nz);
+        Self { low, voxel, size, values }
+    }
+
+    /// Grid spacing, metres.
+    pub(super) fn voxel(&self) -> f32 {
+        self.voxel
+    }
+
+    /// Lowest and highest grid point.
+    pub(super) fn bounds(&self) -> (Vec3, Vec3) {
+        let extent = Vec3::from_array(self.size.map(|n| (n - 1) as f32)) * self.voxel;
+        (self.low, self.low + extent)
+    }
+
+    /// Trilinear value; outside the grid the nearest point's.
+    pub(super) fn sample(&self, p: Vec3) -> f32 {
+        let [nx, ny, nz] = self.size;
+        let g = ((p - self.low) / self.voxel)
+            .clamp(Vec3::ZERO, Vec3::new((nx - 1) as f32, (ny - 1) as f32, (nz - 1) as f32));
+        let cell = |v: f32, n: usize| (v as usize).min(n.saturating_sub(2));
+        let (i, j, k) = (cell(g.x, nx), cell(g.y, ny), cell(g.z, nz));
+        let (fx, fy, fz) = (g.x - i as f32, g.y - j as f32, g.z - k as f32);
+        let (sx, sy, sz) =
+            (usize::from(nx > 1), if ny > 1 { nx } else { 0 }, if nz > 1 { nx * ny } else { 0 });
+        let base = (k * ny + j) * nx + i;
+        let v = &self.values;
+        let lerp = |a: f32, b: f32, t: f32| a + (b - a) * t;
+        let x0 = lerp(v[base], v[base + sx], fx);
+        let x1 = lerp(v[base + sy], v[base + sy + sx], fx);
+        let x2 = lerp(v[base + sz], v[base + sz + sx], fx);
+        let x3 = lerp(v[base + sz + sy], v[base + sz + sy + sx], fx);
+        lerp(lerp(x0, x1, fy), lerp(x2, x3, fy), fz)
+    }
+
+    /// Lowest and highest grid point whose value exceeds `level`, or `None` if there is none.
+    pub(super) fn bounds_above(&self, level: f32) -> Option<(DVec3, DVec3)> {
+        let [nx, ny, _] = self.size;
+        let mut bounds: Option<([usize; 3], [usize; 3])> = None;
+        for (index, _) in self.values.iter().enumerate().filter(|(_, v)| **v > level) {
+            let ijk = [index % nx, index / nx % ny, index / (nx * ny)];
+            let (low, high) = bounds.get_or_insert((ijk, ijk));
+            for axis in 0..3 {
+                low[axis] = low[axis].min(ijk[axis]);
+                high[axis] = high[axis].max(ijk[axis]);
+            }
+        }
+        let point =
+            |ijk: [usize; 3]| (self.low + self.voxel * Vec3::from_array(ijk.map(|v| v as f32))).as_dvec3();
+        bounds.map(|(low, high)| (point(low), point(high)))
+    }
+}

@@ -1,0 +1,74 @@
+//! Depth per pixel: the first point of each ray inside the hull, sub-voxel.
+
+use super::field::Field;
+use crate::error::Result;
+use crate::scene::mask::Label;
+use crate::scene::{DepthMap, View};
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Confidence of a pixel whose ray passes the hull by and was given the hull's nearest point.
+const GRAZING_CONFIDENCE: f32 = 0.5;
+
+/// Planar depth of every vehicle pixel of `view`. A ray that misses the hull (poses or masks a little off)
+/// takes the depth where it comes closest, so that every vehicle pixel is filled, with lower confidence.
+pub(super) fn march(view: &View, field: &Field) -> Result<DepthMap> {
+    let camera = &view.camera;
+    let mask = view.mask.as_ref().expect("hull views have masks");
+    let width = camera.width as usize;
+    let origin = camera.center().as_vec3();
+    let rotation = camera.vehicle_from_camera.rotation.as_mat3();
+    let mut pixels = vec![(0.0f32, 0.0f32); width * camera.height as usize];
+    pixels.par_chunks_mut(width).enumerate().for_each(|(v, row)| {
+        for (u, pixel) in row.iter_mut().enumerate() {
+            if mask.labels()[v * width + u] != Label::Vehicle {
+                continue;
+            }
+            let [x, y] = camera.intrinsics.normalized_from_pixel([u as f64 + 0.5, v as f64 + 0.5]);
+            let direction = rotation * Vec3::new(x as f32, y as f32, 1.0);
+            *pixel = first_inside(field, origin, direction).unwrap_or((0.0, 0.0));
+        }
+    });
+    let (depth, confidence) = pixels.into_iter().unzip();
+    DepthMap::new(camera.width, camera.height, depth)?.with_confidence(confidence)
+}
+
+/// z with `origin + z direction` on the hull's surface, and its confidence; `None` for a ray that misses the
+/// grid altogether. `direction` has z = 1 in the camera frame, so z is planar depth.
+fn first_inside(field: &Field, origin: Vec3, direction: Vec3) -> Option<(f32, f32)> {
+    let (low, high) = field.bounds();
+    let (t0, t1) = ((low - origin) / direction, (high - origin) / direction);
+    let enter = t0.min(t1).max_element().max(0.0);
+    let leave = t0.max(t1).min_element();
+    // A ray in a face of the grid gives NaN; it touches nothing.
+    if enter.is_nan() || leave.is_nan() || enter >= leave {
+        return None;
+    }
+    let metres_per_z = direction.length();
+    let shortest = 0.5 * field.voxel() / metres_per_z;
+    let value = |z: f32| field.sample(origin + z * direction);
+    let (mut before, mut z) = (enter, enter);
+    let mut closest = (enter, f32::NEG_INFINITY);
+    while z <= leave {
+        let f = value(z);
+        if f >= 0.0 {
+            return Some((refine(value, before, z), 1.0));
+        }
+        if f > closest.1 {
+            closest = (z, f);
+        }
+        before = z;
+        // The field falls off no faster than distance, up to the slant of a pixel off the optical axis.
+        z += (-0.7 * f / metres_per_z).max(shortest);
+    }
+    Some((closest.0, GRAZING_CONFIDENCE))
+}
+
+/// Where the value crosses zero between `outside` and `inside`, by bisection to 1/64 of the step.
+fn refine(value: impl Fn(f32) -> f32, mut outside: f32, mut inside: f32) -> f32 {
+    for _ in 0..6 {
+        let middle = 0.5 * (outside + inside);
+        if value(middle) < 0.0 { outside = middle } else { inside = middle }
+    }
+    0.5 * (outside + inside)
+}

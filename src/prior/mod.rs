@@ -1,0 +1,78 @@
+//! Visual priors: where the surface is, as metric planar depth per view (paper sec. "Metric-Scale Geometry").
+
+pub mod given;
+pub mod hull;
+pub mod normals;
+
+pub use given::GivenDepth;
+pub use hull::HullPrior;
+
+use crate::error::Result;
+use crate::progress::Context;
+use crate::scene::{DepthMap, View};
+use glam::Vec3;
+
+/// A source of metric depth.
+pub trait DepthPrior {
+    /// Name in options and reports.
+    fn name(&self) -> &'static str;
+
+    /// One depth map per view, in the view's pinhole grid, metres. Views are undistorted.
+    fn estimate(&self, views: &[View], context: &Context) -> Result<Geometry>;
+}
+
+/// What a prior knows of the vehicle's shape.
+#[derive(Clone, Debug)]
+pub struct Geometry {
+    /// One per view.
+    pub depths: Vec<DepthMap>,
+    /// Unit normals per view in the camera frame, see [`normals::normals`]; filled by
+    /// [`Geometry::find_normals`].
+    pub normals: Vec<Vec<Vec3>>,
+    /// The box it worked in.
+    pub vehicle_box: Option<VehicleBox>,
+}
+
+impl Geometry {
+    /// Depth without normals yet.
+    pub fn new(depths: Vec<DepthMap>, vehicle_box: Option<VehicleBox>) -> Self {
+        Self { depths, normals: Vec::new(), vehicle_box }
+    }
+
+    /// Normals from depth, where the prior gave none.
+    pub fn find_normals(&mut self, views: &[View], context: &Context) {
+        if self.normals.is_empty() {
+            let pairs = views.iter().zip(&self.depths);
+            self.normals = context
+                .parallel(|| pairs.map(|(view, depth)| normals::normals(&view.camera, depth)).collect());
+        }
+    }
+}
+
+/// An axis-aligned box in the vehicle frame, symmetric about y = 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VehicleBox {
+    /// Lowest corner, metres.
+    pub low: [f64; 3],
+    /// Highest corner, metres.
+    pub high: [f64; 3],
+    /// Who said so.
+    pub source: BoxSource,
+}
+
+/// Where a [`VehicleBox`] comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BoxSource {
+    /// The caller.
+    Given,
+    /// The silhouettes.
+    Estimated,
+}
+
+impl VehicleBox {
+    /// Length, width, height in metres.
+    pub fn size(&self) -> [f64; 3] {
+        std::array::from_fn(|k| self.high[k] - self.low[k])
+    }
+}

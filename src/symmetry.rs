@@ -1,0 +1,149 @@
+//! Completing the vehicle across its symmetry plane y = 0 (paper sec. "Symmetry-Aware Gaussian Cloning").
+
+use crate::gaussians::Gaussians;
+use crate::geometry::Camera;
+use serde::Serialize;
+
+/// When Gaussians are cloned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SymmetryMode {
+    /// Clone what has no counterpart: where no view observed the mirrored place. Everything observed stays.
+    #[default]
+    Auto,
+    /// The paper's rule: the side with more Gaussians is the reference; the other side becomes its mirror
+    /// image, whatever was observed there.
+    Always,
+    /// No cloning.
+    Never,
+}
+
+/// A side of the plane y = 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    /// y > 0
+    Left,
+    /// y < 0
+    Right,
+}
+
+/// What was done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Completion {
+    /// The rule.
+    pub mode: SymmetryMode,
+    /// The side with more Gaussians.
+    pub reference_side: Side,
+    /// Gaussians added as mirror images.
+    pub cloned: usize,
+    /// Observed Gaussians given up for mirror images (`Always`).
+    pub replaced: usize,
+    /// Gaussians not cloned because their mirrored place was observed (`Auto`).
+    pub not_needed: usize,
+}
+
+/// Completes the vehicle. `observed(index)` says whether the mirror image of Gaussian `index` lies where some
+/// view has looked; asked in `Auto` only.
+pub fn complete(
+    gaussians: Gaussians,
+    mode: SymmetryMode,
+    cameras: &[Camera],
+    observed: impl Fn(usize) -> bool + Sync,
+) -> (Gaussians, Completion) {
+    let reference_side = reference_side(&gaussians, cameras);
+    let n = gaussians.len();
+    let mut done = Completion { mode, reference_side, cloned: 0, replaced: 0, not_needed: 0 };
+    let complete = match mode {
+        SymmetryMode::Never => gaussians,
+        SymmetryMode::Always => {
+            let mut reference = gaussians.filtered(|i| belongs(gaussians.means()[i][1], reference_side));
+            done.cloned = reference.len();
+            done.replaced = n - reference.len();
+            reference.append_mirrored();
+            reference
+        }
+        SymmetryMode::Auto => {
+            use rayon::prelude::*;
+            let seen: Vec<bool> = (0..n).into_par_iter().map(&observed).collect();
+            let missing = gaussians.filtered(|i| !seen[i]);
+            done.cloned = missing.len();
+            done.not_needed = n - missing.len();
+            let mut all = gaussians;
+            all.append(&missing.mirrored());
+            all
+        }
+    };
+    (complete, done)
+}
+
+/// The denser side; equal counts choose the side with more cameras, then the left.
+fn reference_side(gaussians: &Gaussians, cameras: &[Camera]) -> Side {
+    let balance =
+        |ys: &mut dyn Iterator<Item = f64>| ys.map(|y| i64::from(y > 0.0) - i64::from(y < 0.0)).sum::<i64>();
+    let gaussians = balance(&mut gaussians.means().iter().map(|m| f64::from(m[1])));
+    let cameras = balance(&mut cameras.iter().map(|c| c.center().y));
+    if gaussians < 0 || (gaussians == 0 && cameras < 0) { Side::Right } else { Side::Left }
+}
+
+/// A Gaussian on the plane belongs to the reference side.
+fn belongs(y: f32, side: Side) -> bool {
+    match side {
+        Side::Left => y >= 0.0,
+        Side::Right => y <= 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Intrinsics, Pose};
+
+    fn at(ys: &[f32]) -> Gaussians {
+        let n = ys.len();
+        let means = ys.iter().map(|&y| [0.0, y, 0.0]).collect();
+        Gaussians::from_arrays(
+            0,
+            means,
+            vec![[1.0, 0.0, 0.0, 0.0]; n],
+            vec![[0.1; 3]; n],
+            vec![0.9; n],
+            vec![0.0; 3 * n],
+        )
+        .unwrap()
+    }
+
+    fn ys(g: &Gaussians) -> Vec<f32> {
+        g.means().iter().map(|m| m[1]).collect()
+    }
+
+    #[test]
+    fn always_keeps_the_denser_side_and_replaces_the_other_by_its_mirror_image() {
+        let (g, done) = complete(at(&[-1.0, -0.5, 0.7, 0.0]), SymmetryMode::Always, &[], |_| true);
+        assert_eq!(ys(&g), [-1.0, -0.5, 0.0, 1.0, 0.5, -0.0]);
+        assert_eq!((done.reference_side, done.cloned, done.replaced), (Side::Right, 3, 1));
+    }
+
+    #[test]
+    fn equal_counts_choose_the_side_of_the_cameras_then_the_left() {
+        let i = Intrinsics { fx: 1.0, fy: 1.0, cx: 0.5, cy: 0.5 };
+        let pose = Pose { translation: glam::DVec3::new(0.0, -5.0, 0.0), ..Pose::IDENTITY };
+        let right = Camera::pinhole(1, 1, i, pose).unwrap();
+        let side = |cameras: &[Camera]| complete(at(&[-1.0, 1.0]), SymmetryMode::Always, cameras, |_| true).1;
+        assert_eq!(side(&[right]).reference_side, Side::Right);
+        assert_eq!(side(&[]).reference_side, Side::Left);
+    }
+
+    #[test]
+    fn auto_clones_only_what_no_view_observed_and_keeps_everything_else() {
+        let (g, done) = complete(at(&[-1.0, -0.5, 0.7]), SymmetryMode::Auto, &[], |i| i == 1);
+        assert_eq!(ys(&g), [-1.0, -0.5, 0.7, 1.0, -0.7]);
+        assert_eq!((done.cloned, done.not_needed), (2, 1));
+    }
+
+    #[test]
+    fn never_changes_nothing() {
+        let g = at(&[-1.0, 0.2]);
+        assert_eq!(complete(g.clone(), SymmetryMode::Never, &[], |_| false).0, g);
+    }
+}
