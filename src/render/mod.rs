@@ -1,10 +1,15 @@
 //! Alpha-blended splatting (method section 5): options, targets, and the renderers behind one trait.
 
+pub mod cpu;
+pub mod distorted;
 pub mod options;
 pub mod output;
+pub mod reference;
 
+pub use cpu::CpuRenderer;
 pub use options::{Background, DepthMode, RenderOptions};
 pub use output::Rendered;
+pub use reference::Reference;
 
 use crate::error::Result;
 use crate::gaussians::Gaussians;

@@ -1,0 +1,267 @@
+//! The fast renderer: f32 blending on the processor's vectors, rows of ellipses instead of tiles of pixels.
+//!
+//! Stages, in order: [`project`] (f64, eight Gaussians at a time), [`sort`] (depth bits), [`bin`] (which tile),
+//! [`blend`]. It runs in the rayon pool it is called from and draws the same bytes with any number of threads.
+
+mod bin;
+mod blend;
+mod color;
+mod project;
+mod simd;
+mod sort;
+mod splat;
+mod tile;
+mod view;
+
+use crate::error::Result;
+use crate::gaussians::Gaussians;
+use crate::geometry::Camera;
+use crate::render::distorted::LensMap;
+use crate::render::{RenderOptions, Rendered, Renderer};
+use bin::{Grid, Stripe, TileBounds};
+use rayon::prelude::*;
+use simd::Lanes;
+use splat::Splat;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+use tile::{Planes, TILE_HEIGHT, TILE_WIDTH, Tile};
+use view::PinholeView;
+
+/// Gaussians projected by one task: large enough to hide its cost, small enough to keep threads evenly busy.
+const PROJECT_CHUNK: usize = 2048;
+
+/// Which instructions the kernels are compiled for.
+#[derive(Clone, Copy, Debug)]
+enum Level {
+    #[cfg(target_arch = "x86_64")]
+    Avx2(pulp::x86::V3),
+    Portable(pulp::Scalar256b),
+}
+
+/// Draws on the CPU. Keeps its working memory from picture to picture; may be shared between threads.
+#[derive(Debug)]
+pub struct CpuRenderer {
+    level: Level,
+    scratch: Mutex<Vec<Scratch>>,
+    /// Of the last lens drawn: inverting it takes longer than drawing.
+    lens: Mutex<Option<Arc<LensMap>>>,
+}
+
+/// Wall time of each stage of one picture.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StageTimes {
+    /// Gaussians to splats, with their colours.
+    pub project: Duration,
+    /// Depth order.
+    pub sort: Duration,
+    /// Lists of splats per tile.
+    pub bin: Duration,
+    /// Blending, and writing the picture.
+    pub blend: Duration,
+}
+
+/// Arrays that outlive a picture.
+#[derive(Debug, Default)]
+struct Scratch {
+    splats: Vec<Splat>,
+    keys: Vec<u32>,
+    entries: Vec<u64>,
+    entries_other: Vec<u64>,
+    order: Vec<u32>,
+    bounds: Vec<TileBounds>,
+    stripes: Vec<Stripe>,
+}
+
+impl Default for CpuRenderer {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl CpuRenderer {
+    /// With the widest vectors that pay on this processor: AVX2 and FMA where it has them.
+    pub fn new() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(v3) = pulp::x86::V3::try_new() {
+            return Self::with_level(Level::Avx2(v3));
+        }
+        Self::portable()
+    }
+
+    /// With the target's guaranteed instructions only; for tests and for comparison.
+    pub fn portable() -> Self {
+        Self::with_level(Level::Portable(pulp::Scalar256b))
+    }
+
+    fn with_level(level: Level) -> Self {
+        Self { level, scratch: Mutex::default(), lens: Mutex::default() }
+    }
+
+    /// The instructions in use: `"avx2+fma"` or `"portable"`.
+    pub fn level(&self) -> &'static str {
+        match self.level {
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2(_) => "avx2+fma",
+            Level::Portable(_) => "portable",
+        }
+    }
+
+    /// As [`Renderer::render`] for a pinhole camera, into a picture whose memory is reused.
+    pub fn render_into(
+        &self,
+        gaussians: &Gaussians,
+        camera: &Camera,
+        options: &RenderOptions,
+        target: &mut Rendered,
+    ) -> Result<StageTimes> {
+        camera.validate("camera")?;
+        options.validate()?;
+        if !camera.distortion.is_none() {
+            *target = self.lens_map(camera)?.render(self, gaussians, camera, options)?;
+            return Ok(StageTimes::default());
+        }
+        let mut scratch = self.pool().pop().unwrap_or_default();
+        let times = match self.level {
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2(simd) => draw(simd, gaussians, camera, options, &mut scratch, target),
+            Level::Portable(simd) => draw(simd, gaussians, camera, options, &mut scratch, target),
+        };
+        self.pool().push(scratch);
+        Ok(times)
+    }
+
+    fn pool(&self) -> MutexGuard<'_, Vec<Scratch>> {
+        // A panic elsewhere cannot leave a list of spare buffers in a state that matters.
+        self.scratch.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn lens_map(&self, camera: &Camera) -> Result<Arc<LensMap>> {
+        let known = self.lens.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let Some(map) = known.filter(|map| map.fits(camera)) {
+            return Ok(map);
+        }
+        // Not while holding the lock: the map is made in parallel, and a waiting thread may be one of rayon's.
+        let map = Arc::new(LensMap::new(camera)?);
+        *self.lens.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(&map));
+        Ok(map)
+    }
+}
+
+impl Renderer for CpuRenderer {
+    fn render(&self, gaussians: &Gaussians, camera: &Camera, options: &RenderOptions) -> Result<Rendered> {
+        let mut target =
+            Rendered { width: 0, height: 0, color: Vec::new(), alpha: Vec::new(), depth: Vec::new() };
+        self.render_into(gaussians, camera, options, &mut target)?;
+        Ok(target)
+    }
+}
+
+fn draw<S: Lanes>(
+    simd: S,
+    gaussians: &Gaussians,
+    camera: &Camera,
+    options: &RenderOptions,
+    scratch: &mut Scratch,
+    target: &mut Rendered,
+) -> StageTimes {
+    let view = PinholeView::new(camera, options, gaussians.sh_degree());
+    let start = Instant::now();
+    project_all(simd, &view, gaussians, scratch);
+    let projected = Instant::now();
+    sort_by_depth(scratch);
+    let sorted = Instant::now();
+
+    let grid = Grid::new(camera.width, camera.height);
+    let Scratch { splats, order, bounds, stripes, .. } = scratch;
+    resize(target, camera.width, camera.height);
+    bin::tile_bounds(order, splats, bounds);
+    let mut times =
+        StageTimes { project: projected - start, sort: sorted - projected, ..StageTimes::default() };
+    let mut drawn = 0;
+    // Runs once for an empty scene too, to draw the background.
+    loop {
+        let begin = Instant::now();
+        let first = drawn == 0;
+        let slice = drawn..drawn + bin::slice_len(&bounds[drawn..]);
+        drawn = slice.end;
+        let last = drawn == order.len();
+        bin::bin(grid, &order[slice.clone()], &bounds[slice], stripes);
+        let binned = Instant::now();
+        blend_all(simd, grid, stripes, splats, options, target, [first, last]);
+        times.bin += binned - begin;
+        times.blend += binned.elapsed();
+        if last {
+            return times;
+        }
+    }
+}
+
+fn project_all<S: Lanes>(simd: S, view: &PinholeView, gaussians: &Gaussians, scratch: &mut Scratch) {
+    let n = gaussians.len();
+    scratch.splats.resize(n, Splat::default());
+    scratch.keys.resize(n, 0);
+    let chunks = scratch.splats.par_chunks_mut(PROJECT_CHUNK).zip(scratch.keys.par_chunks_mut(PROJECT_CHUNK));
+    chunks.enumerate().for_each(|(i, (splats, keys))| {
+        let range = i * PROJECT_CHUNK..i * PROJECT_CHUNK + keys.len();
+        simd.vectorize(
+            #[inline(always)]
+            || project::project(view, gaussians, range, splats, keys),
+        );
+    });
+}
+
+fn sort_by_depth(scratch: &mut Scratch) {
+    let Scratch { keys, entries, entries_other, order, .. } = scratch;
+    entries.clear();
+    let drawn = keys.iter().enumerate().filter(|(_, k)| **k != project::NOT_DRAWN);
+    entries.extend(drawn.map(|(i, &k)| sort::entry(k, i as u32)));
+    sort::sort(entries, entries_other);
+    order.clear();
+    order.extend(entries.iter().map(|&e| sort::index(e)));
+}
+
+fn resize(target: &mut Rendered, width: u32, height: u32) {
+    let pixels = width as usize * height as usize;
+    (target.width, target.height) = (width, height);
+    target.color.resize(pixels, [0.0; 3]);
+    target.alpha.resize(pixels, 0.0);
+    target.depth.resize(pixels, 0.0);
+}
+
+/// Blends one slice of the depth order into every tile, a band of rows per task.
+fn blend_all<S: Lanes>(
+    simd: S,
+    grid: Grid,
+    stripes: &[Stripe],
+    splats: &[Splat],
+    options: &RenderOptions,
+    target: &mut Rendered,
+    [first, last]: [bool; 2],
+) {
+    let width = target.width as usize;
+    let band = TILE_HEIGHT * width;
+    let planes = target.color.par_chunks_mut(band).zip(target.alpha.par_chunks_mut(band));
+    let bands = planes.zip(target.depth.par_chunks_mut(band)).enumerate();
+    bands.with_max_len(1).for_each_init(Tile::new, |tile, (row, ((color, alpha), depth))| {
+        let mut planes = Planes { color, alpha, depth, width };
+        let stripe = bin::stripe_of(stripes, row);
+        for column in 0..grid.columns {
+            let x0 = column * TILE_WIDTH;
+            if first {
+                tile.clear(&planes, x0);
+            } else {
+                tile.load(&planes, x0);
+            }
+            let list = stripe.tile(column, row);
+            simd.vectorize(
+                #[inline(always)]
+                || blend::blend(simd, tile, [x0, row * TILE_HEIGHT], list, splats, options.max_alpha),
+            );
+            if last {
+                tile.store_finished(&mut planes, x0, options);
+            } else {
+                tile.store_unfinished(&mut planes, x0);
+            }
+        }
+    });
+}

@@ -1,0 +1,93 @@
+//! Eight f32 lanes on whatever the processor has, and the exponential they need.
+//!
+//! Kernels are written once, generic over [`Lanes`]: pulp's AVX2 + FMA level, found at run time, or its plain
+//! arrays of eight, which the compiler turns into what the target guarantees. Both are eight wide, so one memory
+//! layout serves both.
+
+use pulp::{Scalar256b, Simd, f32x8, i32x8, m32x8, u32x8};
+
+/// A vector width of eight, with the two operations pulp has no portable name for.
+pub(super) trait Lanes: Simd<f32s = f32x8, u32s = u32x8, i32s = i32x8, m32s = m32x8> {
+    /// Bit l is lane l's sign bit.
+    fn sign_bits(self, a: f32x8) -> u32;
+}
+
+impl Lanes for Scalar256b {
+    #[inline(always)]
+    fn sign_bits(self, a: f32x8) -> u32 {
+        let lanes: [u32; 8] = pulp::cast(a);
+        let mut bits = 0;
+        for (l, lane) in lanes.iter().enumerate() {
+            bits |= (lane >> 31) << l;
+        }
+        bits
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Lanes for pulp::x86::V3 {
+    #[inline(always)]
+    fn sign_bits(self, a: f32x8) -> u32 {
+        self.avx._mm256_movemask_ps(pulp::cast(a)) as u32
+    }
+}
+
+/// Below this exponent [`exp2`] returns 2^-100, far under every alpha that is drawn.
+const SMALLEST_EXPONENT: f32 = -100.0;
+
+/// 1.5 * 2^23: adding it rounds an f32 of magnitude below 2^22 to an integer, held in the low mantissa bits.
+const ROUND: f32 = 12_582_912.0;
+
+/// 2^x for x <= 0: 2^round(x) times a polynomial in the rest, which lies in [-0.5, 0.5].
+///
+/// The polynomial interpolates 2^f at Chebyshev nodes with the constant fixed at 1, so that 2^0 is 1.
+#[inline(always)]
+pub(super) fn exp2<S: Lanes>(simd: S, x: f32x8) -> f32x8 {
+    let x = simd.max_f32s(x, simd.splat_f32s(SMALLEST_EXPONENT));
+    let shifted = simd.add_f32s(x, simd.splat_f32s(ROUND));
+    let f = simd.sub_f32s(x, simd.sub_f32s(shifted, simd.splat_f32s(ROUND)));
+    let mut poly = simd.splat_f32s(EXP2_COEFFICIENTS[0]);
+    for c in &EXP2_COEFFICIENTS[1..] {
+        poly = simd.mul_add_e_f32s(poly, f, simd.splat_f32s(*c));
+    }
+    // The integer sits in the low bits of `shifted`; moved into the exponent field it multiplies by 2^n.
+    let n = simd.wrapping_dyn_shl_u32s(simd.transmute_u32s_f32s(shifted), simd.splat_u32s(23));
+    simd.transmute_f32s_u32s(simd.add_u32s(simd.transmute_u32s_f32s(poly), n))
+}
+
+/// Highest power first; largest relative error before rounding 5.1e-9.
+const EXP2_COEFFICIENTS: [f32; 7] = [
+    1.545_316_3e-4,
+    1.339_086_3e-3,
+    9.618_083e-3,
+    5.550_357e-2,
+    0.240_226_5,
+    std::f32::consts::LN_2, // the fit's own coefficient, rounded to f32
+    1.0,
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exp2_is_within_two_ulp_on_every_exponent_that_is_drawn() {
+        let mut worst = 0.0f64;
+        for i in 0..200_000 {
+            let x = -9.0 * i as f32 / 200_000.0;
+            let lanes: [f32; 8] = pulp::cast(exp2(Scalar256b, pulp::cast([x; 8])));
+            let exact = f64::from(x).exp2();
+            let ulp = f64::from(f32::EPSILON) * exact.log2().floor().exp2();
+            worst = worst.max((f64::from(lanes[3]) - exact).abs() / ulp);
+        }
+        assert!(worst <= 2.0, "{worst} ulp");
+    }
+
+    #[test]
+    fn exp2_of_zero_is_one_and_of_huge_or_nan_exponents_is_finite() {
+        let x = [0.0, -0.0, -150.0, -1e30, f32::NEG_INFINITY, f32::NAN, -1.0, -2.0];
+        let y: [f32; 8] = pulp::cast(exp2(Scalar256b, pulp::cast(x)));
+        assert_eq!([y[0], y[1], y[6], y[7]], [1.0, 1.0, 0.5, 0.25]);
+        assert!(y[2..6].iter().all(|v| (0.0..1e-29).contains(v)), "{y:?}");
+    }
+}

@@ -1,0 +1,139 @@
+//! Pictures of cameras with a lens: a finer pinhole picture that covers them, resampled along the lens's rays.
+//!
+//! The pinhole picture is drawn [`SUPERSAMPLING`] times finer with the blur scaled along, so that it is the same
+//! continuous picture, and is read bilinearly. Colour is read premultiplied by alpha, and depth as the accumulated
+//! sum of T alpha z, divided by the resampled alpha in the end: these sums are linear, so an interpolated pixel is
+//! what blending between its neighbours would have drawn, and empty neighbours do not pull its depth towards 0.
+
+use super::{Background, DepthMode, RenderOptions, Rendered, Renderer};
+use crate::error::Result;
+use crate::gaussians::Gaussians;
+use crate::geometry::Camera;
+use crate::geometry::camera::MAX_SIDE;
+use crate::scene::undistort::pinhole_for;
+use rayon::prelude::*;
+
+/// Pinhole pixels per pixel and axis. Interpolating at this spacing keeps the peak of the smallest splat, whose
+/// standard deviation is sqrt(0.3) pixels, to 10 %; its centroid and its sum exactly.
+pub const SUPERSAMPLING: f64 = 2.0;
+
+/// Largest blur the options accept, pixels^2.
+const MAX_BLUR: f32 = 100.0;
+
+/// Where each pixel of a distorted camera lies in the pinhole picture that is drawn for it.
+#[derive(Clone, Debug)]
+pub(super) struct LensMap {
+    source: Camera,
+    pinhole: Camera,
+    /// Position in pinhole pixels; NaN where the lens has no ray. `[height * width]`
+    positions: Vec<[f32; 2]>,
+}
+
+impl LensMap {
+    /// For one lens; the pose is not looked at.
+    pub(super) fn new(source: &Camera) -> Result<Self> {
+        let cover = pinhole_for(source)?;
+        let side = f64::from(cover.width.max(cover.height));
+        let scale = SUPERSAMPLING.min(f64::from(MAX_SIDE) / side);
+        let size = |n: u32| (f64::from(n) * scale).round().clamp(1.0, f64::from(MAX_SIDE)) as u32;
+        let pinhole = cover.scaled_to(size(cover.width), size(cover.height));
+        let (width, height) = (source.width as usize, source.height as usize);
+        let position = |i: usize| {
+            let pixel = [(i % width) as f64 + 0.5, (i / width) as f64 + 0.5];
+            let ray = source.ray(pixel)?;
+            let p = pinhole.intrinsics.pixel_from_normalized([ray.x, ray.y]);
+            let inside = (0.0..=f64::from(pinhole.width)).contains(&p[0])
+                && (0.0..=f64::from(pinhole.height)).contains(&p[1]);
+            inside.then_some(p.map(|v| v as f32))
+        };
+        let positions =
+            (0..width * height).into_par_iter().map(|i| position(i).unwrap_or([f32::NAN; 2])).collect();
+        Ok(Self { source: *source, pinhole, positions })
+    }
+
+    /// Whether this map is of `camera`'s lens and size.
+    pub(super) fn fits(&self, camera: &Camera) -> bool {
+        Camera { vehicle_from_camera: self.source.vehicle_from_camera, ..*camera } == self.source
+    }
+
+    /// The picture of `camera`, whose lens this map is of.
+    pub(super) fn render(
+        &self,
+        renderer: &impl Renderer,
+        gaussians: &Gaussians,
+        camera: &Camera,
+        options: &RenderOptions,
+    ) -> Result<Rendered> {
+        let pinhole = Camera { vehicle_from_camera: camera.vehicle_from_camera, ..self.pinhole };
+        // Focal lengths in pixels grew by this; a blur given in pixels^2 grows by its square.
+        let scale = pinhole.intrinsics.fx / camera.intrinsics.fx;
+        let fine = RenderOptions {
+            background: Background::Transparent,
+            depth_mode: DepthMode::Accumulated,
+            blur: ((f64::from(options.blur) * scale * scale) as f32).min(MAX_BLUR),
+            ..*options
+        };
+        let picture = renderer.render(gaussians, &pinhole, &fine)?;
+        let pixels = camera.width as usize * camera.height as usize;
+        let mut out = Rendered {
+            width: camera.width,
+            height: camera.height,
+            color: vec![[0.0; 3]; pixels],
+            alpha: vec![0.0; pixels],
+            depth: vec![0.0; pixels],
+        };
+        let planes = out.color.par_iter_mut().zip(&mut out.alpha).zip(&mut out.depth);
+        planes.zip(&self.positions).with_min_len(1 << 12).for_each(|(((color, alpha), depth), position)| {
+            let ([r, g, b], a, d) = sample(&picture, *position);
+            let behind = match options.background {
+                Background::Color(rgb) => rgb.map(|v| v * (1.0 - a)),
+                Background::Transparent => [0.0; 3],
+            };
+            *color = [r + behind[0], g + behind[1], b + behind[2]];
+            *alpha = a;
+            *depth = match options.depth_mode {
+                DepthMode::Expected if a > 0.0 => d / a,
+                DepthMode::Expected => 0.0,
+                DepthMode::Accumulated => d,
+            };
+        });
+        Ok(out)
+    }
+}
+
+/// One picture of a camera with a lens, by a renderer that draws pinholes. A pixel without a ray, or whose ray
+/// leaves the widest pinhole that is drawn, shows the background.
+pub fn render(
+    renderer: &impl Renderer,
+    gaussians: &Gaussians,
+    camera: &Camera,
+    options: &RenderOptions,
+) -> Result<Rendered> {
+    camera.validate("camera")?;
+    options.validate()?;
+    LensMap::new(camera)?.render(renderer, gaussians, camera, options)
+}
+
+/// Premultiplied colour, alpha and accumulated depth, bilinear; edges repeated; nothing at NaN.
+fn sample(picture: &Rendered, [x, y]: [f32; 2]) -> ([f32; 3], f32, f32) {
+    if x.is_nan() {
+        return ([0.0; 3], 0.0, 0.0);
+    }
+    let (x, y) = (x - 0.5, y - 0.5);
+    let (fx, fy) = (x - x.floor(), y - y.floor());
+    let mut color = [0.0; 3];
+    let (mut alpha, mut depth) = (0.0, 0.0);
+    for (dx, dy, weight) in
+        [(0, 0, (1.0 - fx) * (1.0 - fy)), (1, 0, fx * (1.0 - fy)), (0, 1, (1.0 - fx) * fy), (1, 1, fx * fy)]
+    {
+        let u = (x.floor() as i32 + dx).clamp(0, picture.width as i32 - 1) as usize;
+        let v = (y.floor() as i32 + dy).clamp(0, picture.height as i32 - 1) as usize;
+        let i = v * picture.width as usize + u;
+        for c in 0..3 {
+            color[c] += weight * picture.color[i][c];
+        }
+        alpha += weight * picture.alpha[i];
+        depth += weight * picture.depth[i];
+    }
+    (color, alpha, depth)
+}
