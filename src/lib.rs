@@ -14,6 +14,7 @@
 pub mod error;
 pub mod gaussians;
 pub mod geometry;
+pub mod io;
 pub mod render;
 pub mod scene;
 
