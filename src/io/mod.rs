@@ -13,6 +13,7 @@ mod listing;
 mod load;
 mod npy;
 mod pfm;
+pub mod ply;
 pub mod scene;
 mod select;
 pub mod transforms;
