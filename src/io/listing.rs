@@ -5,7 +5,7 @@
 
 use super::depth::{DepthFormat, MILLIMETRES};
 use super::files::read_limited;
-use super::{image, json, transforms};
+use super::{colmap, image, json, transforms};
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use std::path::{Path, PathBuf};
@@ -15,10 +15,12 @@ use std::path::{Path, PathBuf};
 pub(super) struct Listing {
     /// The file or folder that holds the poses.
     pub(super) source: PathBuf,
-    /// In the file's order.
+    /// In the file's order; COLMAP's images by name.
     pub(super) views: Vec<ListedView>,
     /// Why the world of the poses is not the vehicle's frame, if it is not: field and reason.
     pub(super) not_vehicle_frame: Option<(&'static str, &'static str)>,
+    /// The folder of a COLMAP model, which may have sparse points.
+    pub(super) sparse_model: Option<PathBuf>,
 }
 
 /// One view of a [`Listing`].
@@ -43,22 +45,26 @@ pub struct DepthFile {
     pub unit: f64,
 }
 
-/// Lists the scene at `path`: a `transforms.json`, or a folder with one.
+/// Lists the scene at `path`: a `transforms.json`, a folder with one, or else a COLMAP folder.
 pub(super) fn list(path: &Path) -> Result<Listing> {
     let meta = std::fs::metadata(path).map_err(|e| Error::io(path, e))?;
     if meta.is_file() {
+        if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("json")) {
+            return Err(Error::format(path, "scene", NO_SCENE));
+        }
         return list_transforms(path);
     }
     let transforms = path.join("transforms.json");
     if transforms.is_file() {
         return list_transforms(&transforms);
     }
-    Err(Error::format(
-        path,
-        "scene",
-        "holds neither transforms.json nor a COLMAP model (sparse/0 with cameras.bin and images.bin, or .txt)",
-    ))
+    match colmap::find_model(path) {
+        Some(model) => list_colmap(path, &model),
+        None => Err(Error::format(path, "scene", NO_SCENE)),
+    }
 }
+
+const NO_SCENE: &str = "neither a transforms.json, nor a folder with one, nor a folder with a COLMAP model (cameras.bin and images.bin, or .txt, in sparse/0, in sparse, or in itself)";
 
 fn list_transforms(path: &Path) -> Result<Listing> {
     let file = transforms::parse(&read_limited(path, json::MAX_FILE)?, path)?;
@@ -95,7 +101,39 @@ fn list_transforms(path: &Path) -> Result<Listing> {
     let not_vehicle_frame = file.moved_by.map(|key| {
         (key, "not the identity: the poses were moved after they were measured, so that their world need not be the vehicle's frame. Pass the similarity from these poses to the vehicle's frame (--vehicle-from-world FILE), or drop the key if they are in it")
     });
-    Ok(Listing { source: path.to_owned(), views, not_vehicle_frame })
+    Ok(Listing { source: path.to_owned(), views, not_vehicle_frame, sparse_model: None })
+}
+
+/// `model` is the model's folder, at or below `path`.
+fn list_colmap(path: &Path, model: &Path) -> Result<Listing> {
+    let root = colmap_root(path, model);
+    let read = colmap::read_model(model)?;
+    let views = read.images.iter().map(|image| {
+        let name = image.name.to_string_lossy().into_owned();
+        Ok(ListedView {
+            path_in_file: name.clone(),
+            name,
+            camera: read.camera_of(image)?,
+            image: root.join("images").join(&image.name),
+            mask: find_mask(&root.join("masks"), &[&image.name]),
+            depth: find_depth(&root.join("depth"), &image.name),
+        })
+    });
+    let reason = "missing: where a COLMAP model lies, how it is turned and how large it is are arbitrary, so that it is not in the vehicle's frame. Pass the similarity from the model to the vehicle's frame (--vehicle-from-world FILE)";
+    Ok(Listing {
+        source: model.to_owned(),
+        views: views.collect::<Result<_>>()?,
+        not_vehicle_frame: Some(("vehicle_from_world", reason)),
+        sparse_model: Some(model.to_owned()),
+    })
+}
+
+/// The folder that holds `images/`: the model's own or one above it, else the one given.
+fn colmap_root(path: &Path, model: &Path) -> PathBuf {
+    // A relative path such as "." has ancestors too, once it is made absolute.
+    let absolute = std::path::absolute(model).unwrap_or_else(|_| model.to_owned());
+    let root = absolute.ancestors().take(3).find(|folder| folder.join("images").is_dir());
+    root.map_or_else(|| path.to_owned(), Path::to_owned)
 }
 
 /// `masks/<path with .png>`, else `masks/<path>.png` (COLMAP's 000.jpg.png), for the first path that has one.
@@ -111,7 +149,6 @@ pub(super) fn find_mask(masks: &Path, relative: &[&Path]) -> Option<PathBuf> {
 }
 
 /// `depth/<path with .png, .npy, .pfm or .exr>`; integers are millimetres, floats metres.
-#[expect(dead_code, reason = "used by the COLMAP reader")]
 pub(super) fn find_depth(depth: &Path, relative: &Path) -> Option<DepthFile> {
     let formats = [
         ("png", DepthFormat::Png),

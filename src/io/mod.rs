@@ -4,6 +4,7 @@
 //! Parsers work on bytes and touch no file system, so that they can be fuzzed. Writers replace a file only once
 //! the new one is complete.
 
+pub mod colmap;
 pub mod depth;
 mod exr;
 mod files;
@@ -17,5 +18,10 @@ pub mod ply;
 pub mod scene;
 mod select;
 pub mod transforms;
+pub mod vehicle_frame;
 
 pub use scene::{NamedCamera, SceneFiles, SceneIndex, SceneOptions, SceneView, list_scene, open_scene};
+pub use vehicle_frame::{
+    Alignment, read_known_centers, read_vehicle_from_world, vehicle_from_known_centers,
+    write_vehicle_from_world,
+};

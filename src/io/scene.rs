@@ -1,10 +1,12 @@
 //! Opens a scene on disk: first a listing of names, cameras and files, then the pixels of the views asked for.
 
 use super::listing::{self, Listing};
-use super::{load, select};
+use super::{colmap, load, select};
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, Similarity};
+use crate::io::ply::ColoredPoints;
 use crate::scene::Scene;
+use glam::DVec3;
 use std::path::{Path, PathBuf};
 
 pub use super::listing::DepthFile;
@@ -12,8 +14,7 @@ pub use super::listing::DepthFile;
 /// What of a scene is wanted, and what its files do not say.
 #[derive(Clone, Debug)]
 pub struct SceneOptions {
-    /// The views, in this order, each by path, file name, or file name without extension; `None` means all, in
-    /// the order of the file.
+    /// The views, in this order, each by path, file name, or file name without extension; `None` means all.
     pub views: Option<Vec<String>>,
     /// Takes the world of the poses to the vehicle's frame. A COLMAP model needs one; a `transforms.json` is
     /// taken to be in the vehicle's frame without.
@@ -36,8 +37,10 @@ impl Default for SceneOptions {
 pub struct SceneIndex {
     /// The `transforms.json` or the COLMAP model's folder.
     pub source: PathBuf,
-    /// In the order asked for.
+    /// In the order asked for; else as in the `transforms.json`, or by name.
     pub views: Vec<SceneView>,
+    sparse_model: Option<PathBuf>,
+    vehicle_from_world: Option<Similarity>,
 }
 
 /// One view of a [`SceneIndex`].
@@ -82,7 +85,7 @@ pub fn list_scene(path: &Path, options: &SceneOptions) -> Result<SceneIndex> {
     {
         return Err(Error::argument("depth_scale", unit.to_string(), "metres per unit, above 0"));
     }
-    let Listing { source, mut views, not_vehicle_frame } = listing::list(path)?;
+    let Listing { source, mut views, not_vehicle_frame, sparse_model } = listing::list(path)?;
     if let (None, Some((field, reason))) = (&options.vehicle_from_world, not_vehicle_frame) {
         return Err(Error::format(&source, field, reason));
     }
@@ -99,7 +102,8 @@ pub fn list_scene(path: &Path, options: &SceneOptions) -> Result<SceneIndex> {
         let depth = depth.map(|d| DepthFile { unit: options.depth_scale.unwrap_or(d.unit), ..d });
         Ok(SceneView { name: view.name, camera, image: view.image, mask: view.mask, depth })
     });
-    Ok(SceneIndex { source, views: views.collect::<Result<_>>()? })
+    let vehicle_from_world = options.vehicle_from_world;
+    Ok(SceneIndex { source, views: views.collect::<Result<_>>()?, sparse_model, vehicle_from_world })
 }
 
 /// Lists the scene at `path` and reads the pictures, masks and depth maps of the views asked for.
@@ -111,6 +115,18 @@ impl SceneIndex {
     /// The cameras alone.
     pub fn cameras(&self) -> Vec<NamedCamera> {
         self.views.iter().map(|v| NamedCamera { name: v.name.clone(), camera: v.camera }).collect()
+    }
+
+    /// The sparse points of a COLMAP model, moved to the vehicle's frame, metres; `None` where there are none.
+    /// They include ground and surroundings.
+    pub fn sparse_points(&self) -> Result<Option<ColoredPoints>> {
+        let Some(model) = &self.sparse_model else { return Ok(None) };
+        let Some(points) = colmap::read_points(model)? else { return Ok(None) };
+        let moved = |&p: &[f64; 3]| {
+            let p = DVec3::from_array(p);
+            self.vehicle_from_world.map_or(p, |s| s.transform_point(p)).as_vec3().to_array()
+        };
+        Ok(Some((points.positions.iter().map(moved).collect(), points.colors)))
     }
 
     /// Reads the pixels of all views listed.
