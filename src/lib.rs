@@ -15,6 +15,7 @@ pub mod error;
 pub mod gaussians;
 pub mod geometry;
 pub mod head;
+pub mod io;
 pub mod metrics;
 pub mod pipeline;
 pub mod prior;

@@ -1,0 +1,175 @@
+//! What a scene on disk consists of, before any pixel is read: pictures' names, cameras, and files.
+//!
+//! Poses are those of the files, `world_from_camera`; whether that world is the vehicle's frame is for
+//! [`super::scene`] to settle.
+
+use super::depth::{DepthFormat, MILLIMETRES};
+use super::files::read_limited;
+use super::{colmap, image, json, transforms};
+use crate::error::{Error, Result};
+use crate::geometry::Camera;
+use std::path::{Path, PathBuf};
+
+/// A scene's views in the world of its files.
+#[derive(Clone, Debug)]
+pub(super) struct Listing {
+    /// The file or folder that holds the poses.
+    pub(super) source: PathBuf,
+    /// In the file's order; COLMAP's images by name.
+    pub(super) views: Vec<ListedView>,
+    /// Why the world of the poses is not the vehicle's frame, if it is not: field and reason.
+    pub(super) not_vehicle_frame: Option<(&'static str, &'static str)>,
+    /// The folder of a COLMAP model, which may have sparse points.
+    pub(super) sparse_model: Option<PathBuf>,
+}
+
+/// One view of a [`Listing`].
+#[derive(Clone, Debug)]
+pub(super) struct ListedView {
+    pub(super) name: String,
+    /// As the scene file writes it.
+    pub(super) path_in_file: String,
+    /// `vehicle_from_camera` still holds `world_from_camera`.
+    pub(super) camera: Camera,
+    pub(super) image: PathBuf,
+    pub(super) mask: Option<PathBuf>,
+    pub(super) depth: Option<DepthFile>,
+}
+
+/// A depth file and what its numbers mean.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DepthFile {
+    /// PNG, NPY, PFM or EXR.
+    pub path: PathBuf,
+    /// Metres per number in the file.
+    pub unit: f64,
+}
+
+/// Lists the scene at `path`: a `transforms.json`, a folder with one, or else a COLMAP folder.
+pub(super) fn list(path: &Path) -> Result<Listing> {
+    let meta = std::fs::metadata(path).map_err(|e| Error::io(path, e))?;
+    if meta.is_file() {
+        if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("json")) {
+            return Err(Error::format(path, "scene", NO_SCENE));
+        }
+        return list_transforms(path);
+    }
+    let transforms = path.join("transforms.json");
+    if transforms.is_file() {
+        return list_transforms(&transforms);
+    }
+    match colmap::find_model(path) {
+        Some(model) => list_colmap(path, &model),
+        None => Err(Error::format(path, "scene", NO_SCENE)),
+    }
+}
+
+const NO_SCENE: &str = "neither a transforms.json, nor a folder with one, nor a folder with a COLMAP model (cameras.bin and images.bin, or .txt, in sparse/0, in sparse, or in itself)";
+
+fn list_transforms(path: &Path) -> Result<Listing> {
+    let file = transforms::parse(&read_limited(path, json::MAX_FILE)?, path)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut views = Vec::with_capacity(file.frames.len());
+    for (i, frame) in file.frames.iter().enumerate() {
+        let field = format!("frames[{i}]");
+        let mut image = folder.join(&frame.file_path);
+        // The NeRF synthetic scenes leave the extension out.
+        if frame.file_path.extension().is_none() && !image.is_file() {
+            image.set_extension("png");
+        }
+        let size = match frame.size {
+            Some(size) => size,
+            None => image::size(&image)?,
+        };
+        let in_images = frame.file_path.strip_prefix("images").unwrap_or(&frame.file_path);
+        let mask = match &frame.mask_path {
+            Some(mask) => Some(folder.join(mask)),
+            None => find_mask(&folder.join("masks"), &[in_images, &frame.file_path]),
+        };
+        let unit = file.depth_unit.unwrap_or(MILLIMETRES);
+        let depth = frame.depth_file_path.as_ref().map(|d| DepthFile { path: folder.join(d), unit });
+        views.push(ListedView {
+            name: in_images.to_string_lossy().into_owned(),
+            path_in_file: frame.file_path.to_string_lossy().into_owned(),
+            camera: frame.camera(size, path, &field)?,
+            image,
+            mask,
+            depth,
+        });
+    }
+    refuse_repeated(path, "file_path", &views)?;
+    let not_vehicle_frame = file.moved_by.map(|key| {
+        (key, "not the identity: the poses were moved after they were measured, so that their world need not be the vehicle's frame. Pass the similarity from these poses to the vehicle's frame (--vehicle-from-world FILE), or drop the key if they are in it")
+    });
+    Ok(Listing { source: path.to_owned(), views, not_vehicle_frame, sparse_model: None })
+}
+
+/// `model` is the model's folder, at or below `path`.
+fn list_colmap(path: &Path, model: &Path) -> Result<Listing> {
+    let root = colmap_root(path, model);
+    let read = colmap::read_model(model)?;
+    let views = read.images.iter().map(|image| {
+        let name = image.name.to_string_lossy().into_owned();
+        Ok(ListedView {
+            path_in_file: name.clone(),
+            name,
+            camera: read.camera_of(image)?,
+            image: root.join("images").join(&image.name),
+            mask: find_mask(&root.join("masks"), &[&image.name]),
+            depth: find_depth(&root.join("depth"), &image.name),
+        })
+    });
+    let reason = "missing: where a COLMAP model lies, how it is turned and how large it is are arbitrary, so that it is not in the vehicle's frame. Pass the similarity from the model to the vehicle's frame (--vehicle-from-world FILE)";
+    Ok(Listing {
+        source: model.to_owned(),
+        views: views.collect::<Result<_>>()?,
+        not_vehicle_frame: Some(("vehicle_from_world", reason)),
+        sparse_model: Some(model.to_owned()),
+    })
+}
+
+/// The folder that holds `images/`: the model's own or one above it, else the one given.
+fn colmap_root(path: &Path, model: &Path) -> PathBuf {
+    // A relative path such as "." has ancestors too, once it is made absolute.
+    let absolute = std::path::absolute(model).unwrap_or_else(|_| model.to_owned());
+    let root = absolute.ancestors().take(3).find(|folder| folder.join("images").is_dir());
+    root.map_or_else(|| path.to_owned(), Path::to_owned)
+}
+
+/// `masks/<path with .png>`, else `masks/<path>.png` (COLMAP's 000.jpg.png), for the first path that has one.
+pub(super) fn find_mask(masks: &Path, relative: &[&Path]) -> Option<PathBuf> {
+    relative
+        .iter()
+        .flat_map(|path| {
+            let mut longer = masks.join(path).into_os_string();
+            longer.push(".png");
+            [masks.join(path).with_extension("png"), PathBuf::from(longer)]
+        })
+        .find(|candidate| candidate.is_file())
+}
+
+/// `depth/<path with .png, .npy, .pfm or .exr>`; integers are millimetres, floats metres.
+pub(super) fn find_depth(depth: &Path, relative: &Path) -> Option<DepthFile> {
+    let formats = [
+        ("png", DepthFormat::Png),
+        ("npy", DepthFormat::Npy),
+        ("pfm", DepthFormat::Pfm),
+        ("exr", DepthFormat::Exr),
+    ];
+    formats.into_iter().find_map(|(extension, format)| {
+        let path = depth.join(relative).with_extension(extension);
+        path.is_file().then(|| DepthFile { path, unit: format.default_unit() })
+    })
+}
+
+/// Two entries of one picture would be two views with one name.
+pub(super) fn refuse_repeated(path: &Path, field: &str, views: &[ListedView]) -> Result<()> {
+    let mut seen = std::collections::HashMap::new();
+    for (i, view) in views.iter().enumerate() {
+        if let Some(first) = seen.insert(view.image.as_path(), i) {
+            let reason = format!("{:?} again, after entry {first}; allowed: once", view.path_in_file);
+            return Err(Error::format(path, format!("frames[{i}].{field}"), reason));
+        }
+    }
+    Ok(())
+}

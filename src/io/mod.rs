@@ -1,0 +1,27 @@
+//! Files in and out: scenes (`transforms.json`, COLMAP), pictures, masks, depth maps, Gaussians as PLY.
+//!
+//! Every reader checks what a file claims before it allocates by it, and names file and field in its errors.
+//! Parsers work on bytes and touch no file system, so that they can be fuzzed. Writers replace a file only once
+//! the new one is complete.
+
+pub mod colmap;
+pub mod depth;
+mod exr;
+mod files;
+pub mod image;
+mod json;
+mod listing;
+mod load;
+mod npy;
+mod pfm;
+pub mod ply;
+pub mod scene;
+mod select;
+pub mod transforms;
+pub mod vehicle_frame;
+
+pub use scene::{NamedCamera, SceneFiles, SceneIndex, SceneOptions, SceneView, list_scene, open_scene};
+pub use vehicle_frame::{
+    Alignment, read_known_centers, read_vehicle_from_world, vehicle_from_known_centers,
+    write_vehicle_from_world,
+};

@@ -1,0 +1,9 @@
+//! PLY: Gaussians in the 3DGS layout, and coloured point clouds.
+
+mod gaussians;
+mod header;
+mod points;
+mod rows;
+
+pub use gaussians::{PlyNotes, read, read_from, write, write_to};
+pub use points::{ColoredPoints, read_points, read_points_from, write_points};

@@ -1,0 +1,137 @@
+//! Opens a scene on disk: first a listing of names, cameras and files, then the pixels of the views asked for.
+
+use super::listing::{self, Listing};
+use super::{colmap, load, select};
+use crate::error::{Error, Result};
+use crate::geometry::{Camera, Similarity};
+use crate::io::ply::ColoredPoints;
+use crate::scene::Scene;
+use glam::DVec3;
+use std::path::{Path, PathBuf};
+
+pub use super::listing::DepthFile;
+
+/// What of a scene is wanted, and what its files do not say.
+#[derive(Clone, Debug)]
+pub struct SceneOptions {
+    /// The views, in this order, each by path, file name, or file name without extension; `None` means all.
+    pub views: Option<Vec<String>>,
+    /// Takes the world of the poses to the vehicle's frame. A COLMAP model needs one; a `transforms.json` is
+    /// taken to be in the vehicle's frame without.
+    pub vehicle_from_world: Option<Similarity>,
+    /// Metres per number in the depth files, instead of what the scene says.
+    pub depth_scale: Option<f64>,
+    /// Whether depth files are read where there are any.
+    pub load_depth: bool,
+}
+
+impl Default for SceneOptions {
+    fn default() -> Self {
+        Self { views: None, vehicle_from_world: None, depth_scale: None, load_depth: true }
+    }
+}
+
+/// A scene's views before their pixels are read. Pictures need not exist, unless the scene file leaves their
+/// size to them.
+#[derive(Clone, Debug)]
+pub struct SceneIndex {
+    /// The `transforms.json` or the COLMAP model's folder.
+    pub source: PathBuf,
+    /// In the order asked for; else as in the `transforms.json`, or by name.
+    pub views: Vec<SceneView>,
+    sparse_model: Option<PathBuf>,
+    vehicle_from_world: Option<Similarity>,
+}
+
+/// One view of a [`SceneIndex`].
+#[derive(Clone, Debug)]
+pub struct SceneView {
+    /// The picture's path below its images folder.
+    pub name: String,
+    /// Posed in the vehicle's frame.
+    pub camera: Camera,
+    /// The picture.
+    pub image: PathBuf,
+    /// The mask, where there is a file for it.
+    pub mask: Option<PathBuf>,
+    /// The depth map, where there is a file for it.
+    pub depth: Option<DepthFile>,
+}
+
+/// A camera and what it is called.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedCamera {
+    /// The picture's path below its images folder.
+    pub name: String,
+    /// Posed in the vehicle's frame.
+    pub camera: Camera,
+}
+
+/// A scene with its pixels.
+#[derive(Clone, Debug)]
+pub struct SceneFiles {
+    /// Where each view came from.
+    pub index: SceneIndex,
+    /// The views, in the order of the index.
+    pub scene: Scene,
+    /// What is legal but looks like a mistake, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Lists the views of the scene at `path`: a `transforms.json`, a folder with one, or a COLMAP folder.
+pub fn list_scene(path: &Path, options: &SceneOptions) -> Result<SceneIndex> {
+    if let Some(unit) = options.depth_scale
+        && !(unit > 0.0 && unit.is_finite())
+    {
+        return Err(Error::argument("depth_scale", unit.to_string(), "metres per unit, above 0"));
+    }
+    let Listing { source, mut views, not_vehicle_frame, sparse_model } = listing::list(path)?;
+    if let (None, Some((field, reason))) = (&options.vehicle_from_world, not_vehicle_frame) {
+        return Err(Error::format(&source, field, reason));
+    }
+    if let Some(names) = &options.views {
+        views = select::select(&views, names)?.into_iter().map(|i| views[i].clone()).collect();
+    }
+    let views = views.into_iter().map(|view| {
+        let mut camera = view.camera;
+        if let Some(vehicle_from_world) = &options.vehicle_from_world {
+            camera.vehicle_from_camera = vehicle_from_world.transform_pose(&camera.vehicle_from_camera);
+        }
+        camera.validate(&view.name)?;
+        let depth = view.depth.filter(|_| options.load_depth);
+        let depth = depth.map(|d| DepthFile { unit: options.depth_scale.unwrap_or(d.unit), ..d });
+        Ok(SceneView { name: view.name, camera, image: view.image, mask: view.mask, depth })
+    });
+    let vehicle_from_world = options.vehicle_from_world;
+    Ok(SceneIndex { source, views: views.collect::<Result<_>>()?, sparse_model, vehicle_from_world })
+}
+
+/// Lists the scene at `path` and reads the pictures, masks and depth maps of the views asked for.
+pub fn open_scene(path: &Path, options: &SceneOptions) -> Result<SceneFiles> {
+    list_scene(path, options)?.load()
+}
+
+impl SceneIndex {
+    /// The cameras alone.
+    pub fn cameras(&self) -> Vec<NamedCamera> {
+        self.views.iter().map(|v| NamedCamera { name: v.name.clone(), camera: v.camera }).collect()
+    }
+
+    /// The sparse points of a COLMAP model, moved to the vehicle's frame, metres; `None` where there are none.
+    /// They include ground and surroundings.
+    pub fn sparse_points(&self) -> Result<Option<ColoredPoints>> {
+        let Some(model) = &self.sparse_model else { return Ok(None) };
+        let Some(points) = colmap::read_points(model)? else { return Ok(None) };
+        let moved = |&p: &[f64; 3]| {
+            let p = DVec3::from_array(p);
+            self.vehicle_from_world.map_or(p, |s| s.transform_point(p)).as_vec3().to_array()
+        };
+        Ok(Some((points.positions.iter().map(moved).collect(), points.colors)))
+    }
+
+    /// Reads the pixels of all views listed.
+    pub fn load(self) -> Result<SceneFiles> {
+        let (scene, notes) = load::load(&self.views)?;
+        Ok(SceneFiles { index: self, scene, notes })
+    }
+}
