@@ -11,6 +11,8 @@
 //! * Pictures are 8-bit sRGB and stay so encoded; row 0 is the top row.
 //! * Depth is planar z along the optical axis in metres; 0 means none.
 
+#![warn(unreachable_pub)]
+
 pub mod error;
 pub mod gaussians;
 pub mod geometry;

@@ -125,11 +125,11 @@ fn point_cloud(views: &[View], geometry: &Geometry) -> PointCloud {
     let mut cloud = PointCloud::default();
     for (view, depth) in views.iter().zip(&geometry.depths) {
         for (v, u) in (0..view.camera.height).flat_map(|v| (0..view.camera.width).map(move |u| (v, u))) {
-            if view.mask.as_ref().is_none_or(|m| m.is_vehicle(u, v)) {
-                if let Some(z) = depth.get(u, v) {
-                    cloud.positions.push(view.lift(u, v, z).to_array());
-                    cloud.colors.push(view.image.get(u, v));
-                }
+            if view.mask.as_ref().is_none_or(|m| m.is_vehicle(u, v))
+                && let Some(z) = depth.get(u, v)
+            {
+                cloud.positions.push(view.lift(u, v, z).to_array());
+                cloud.colors.push(view.image.get(u, v));
             }
         }
     }
