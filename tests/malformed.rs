@@ -66,6 +66,7 @@ fn transforms() {
     row("cut off", &["EOF"], &good[..good.len() - 2]);
     row("text after the end", &["end of document"], &format!("{good} x"));
     row("nested without end", &["frames"], &format!("{{\"frames\": {}", "[".repeat(100_000)));
+    row("an array for a document", &["document: not an object"], "[[]]");
     row("no frames key", &["frames"], "{}");
     row("no frames", &["frames", "empty"], r#"{"fl_x": 1, "frames": []}"#);
     row("frames is an object", &["frames"], r#"{"fl_x": 1, "frames": {}}"#);
