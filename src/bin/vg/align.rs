@@ -2,13 +2,22 @@
 
 use crate::args::AlignArgs;
 use crate::files;
-use crate::job::{Outcome, Result};
+use crate::job::{Failure, Outcome, Result};
 use std::fmt::Write;
 use vg::io;
+
+/// Fewer centres leave the turn about their line open.
+const FEWEST: usize = 3;
 
 /// Fits, writes, and says how well it fits.
 pub(crate) fn run(args: &AlignArgs) -> Result {
     let known = io::read_known_centers(&args.known_centers)?;
+    if known.len() < FEWEST {
+        let (path, n) = (args.known_centers.display(), known.len());
+        return Err(Failure::job(format!(
+            "{path}: {n} camera centres; expected at least {FEWEST}, not on one line"
+        )));
+    }
     let alignment = io::vehicle_from_known_centers(&args.scene, &known)?;
     files::refuse_clashes(std::slice::from_ref(&args.output), std::slice::from_ref(&args.known_centers))?;
     files::prepare(&args.output)?;

@@ -8,7 +8,7 @@ use vg::symmetry::SymmetryMode;
 
 /// Reconstructs a vehicle from posed, masked photographs of one side as metric 3D Gaussians.
 #[derive(Parser)]
-#[command(version, after_help = EXIT_CODES, arg_required_else_help = true, infer_long_args = false)]
+#[command(name = "vg", version, after_help = EXIT_CODES, arg_required_else_help = true, infer_long_args = false)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,

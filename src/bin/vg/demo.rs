@@ -75,7 +75,15 @@ fn text(folder: &Path, split: &split::Split, hull: &Measured, given: &Measured) 
             shown::count(m.gaussians as usize),
         )
     };
-    let file = |name: &str| folder.join(name).display().to_string();
+    let written = [
+        ("contact.png", "inputs; the unseen side as rendered; the same as photographed"),
+        ("unseen", "the renders in full size"),
+        ("asset.ply", "the model, for any viewer of 3D Gaussians"),
+        ("points.ply", "the metric coloured point cloud of the inputs"),
+        ("report.json", "stage times, counts, what was left out and why"),
+        ("scene", "the sample itself, to try the other commands on"),
+    ];
+    let files = written.map(|(name, what)| format!("  {:<12} {what}", name));
     [
         format!(
             "{} photographs of the right side in; errors in {} photographs of the left side:",
@@ -88,13 +96,9 @@ fn text(folder: &Path, split: &split::Split, hull: &Measured, given: &Measured) 
         ),
         row("silhouettes (--prior hull)", hull),
         row("the scene (--prior given)", given),
-        "The second row is a bound: it is given the true depth of the input views. Written, of the first row:".into(),
-        format!("  {:<22} inputs; the unseen side as rendered; the same as photographed", file("contact.png")),
-        format!("  {:<22} the renders in full size", file("unseen/")),
-        format!("  {:<22} the model, for any viewer of 3D Gaussians", file("asset.ply")),
-        format!("  {:<22} the metric coloured point cloud of the inputs", file("points.ply")),
-        format!("  {:<22} stage times, counts, what was left out and why", file("report.json")),
-        format!("  {:<22} the sample itself, to try the other commands on", file("scene/")),
+        "The second row is a bound: it is given the true depth of the inputs. Of the first row there are now,".into(),
+        format!("in {}:", folder.display()),
+        files.join("\n"),
     ]
     .join("\n")
 }

@@ -84,11 +84,14 @@ fn turntable(gaussians: &Gaussians, n: u32, (width, height): (u32, u32)) -> Resu
         gaussians.bounds().ok_or_else(|| Failure::job("the model has no Gaussians to walk around"))?;
     let (low, high) = (low.map(f64::from), high.map(f64::from));
     let center = 0.5 * (DVec3::from(low) + DVec3::from(high));
-    let radius = (0.5 * (DVec3::from(high) - DVec3::from(low)).length()).max(1e-3);
+    let half = 0.5 * (DVec3::from(high) - DVec3::from(low));
+    // The cylinder around the model fits between the picture's borders from every side.
+    let radius = half.x.hypot(half.y).max(1e-3);
     let focal = 0.5 * f64::from(height) / (0.5 * FIELD_OF_VIEW).tan();
-    // The sphere around the model touches the narrower pair of the picture's borders.
-    let half_angle = (0.5 * f64::from(width.min(height)) / focal).atan();
-    let distance = radius / half_angle.sin();
+    let tangent = |side: u32| 0.5 * f64::from(side) / focal;
+    let for_width = radius / tangent(width).atan().sin();
+    let for_height = (half.z * ELEVATION.cos() + radius * ELEVATION.sin()) / tangent(height) + radius;
+    let distance = for_width.max(for_height);
     let intrinsics =
         Intrinsics { fx: focal, fy: focal, cx: 0.5 * f64::from(width), cy: 0.5 * f64::from(height) };
     let digits = (n - 1).to_string().len().max(3);
