@@ -29,7 +29,10 @@ const THICKNESS: f32 = 0.2;
 const MAX_STRETCH: f32 = 4.0;
 
 /// Peak opacity.
-const OPACITY: f32 = 0.95;
+const OPACITY: f32 = 0.9;
+
+/// A view that shows a place at a fraction of the resolution still tells its colour.
+const MIN_WEIGHT: f32 = 0.3;
 
 /// Views agree on a surface to about this, metres.
 const SURFACE_M: f32 = 0.06;
@@ -106,7 +109,7 @@ impl SurfelHead {
                 samples[n] = Sample {
                     direction: (place - observer.center).normalize_or(Vec3::X),
                     color: observer.color_at(place),
-                    weight: (resolution / own_resolution).clamp(1e-3, 1.0),
+                    weight: (resolution / own_resolution).clamp(MIN_WEIGHT, 1.0),
                 };
                 n += 1;
             }

@@ -189,14 +189,24 @@ fn footprint(view: &View, z: f32) -> f32 {
     z / view.camera.intrinsics.fx.min(view.camera.intrinsics.fy) as f32
 }
 
-/// A vehicle pixel with a background neighbour: its colour is partly the background's, and its surfel would
-/// spill over the silhouette by its own footprint; the neighbours' footprints cover it.
+/// A vehicle pixel between background and a pixel that is vehicle all round: its colour is partly the
+/// background's, and its surfel would spill over the silhouette by its own footprint; the neighbour's footprint
+/// covers it. A structure so thin that it has no such inside keeps its pixels.
 fn is_at_edge(mask: &Mask, u: i32, v: i32) -> bool {
-    [(-1, 0), (1, 0), (0, -1), (0, 1)].into_iter().any(|(du, dv)| {
-        let (u, v) = (u + du, v + dv);
+    const CROSS: [(i32, i32); 4] = [(-1, 0), (1, 0), (0, -1), (0, 1)];
+    let label = |u: i32, v: i32| {
         let inside = u >= 0 && v >= 0 && u < mask.width() as i32 && v < mask.height() as i32;
-        inside && mask.labels()[v as usize * mask.width() as usize + u as usize] == Label::Background
-    })
+        inside.then(|| mask.labels()[v as usize * mask.width() as usize + u as usize])
+    };
+    let beside_background =
+        |u: i32, v: i32| CROSS.iter().any(|(du, dv)| label(u + du, v + dv) == Some(Label::Background));
+    let has_inner_neighbour = || {
+        (-1..=1).any(|dv| {
+            (-1..=1)
+                .any(|du| label(u + du, v + dv) == Some(Label::Vehicle) && !beside_background(u + du, v + dv))
+        })
+    };
+    beside_background(u, v) && has_inner_neighbour()
 }
 
 /// A pixel that fewer than three of its neighbours share a surface with hangs between two surfaces.

@@ -203,7 +203,7 @@ mod tests {
     #[test]
     fn the_distance_transform_equals_brute_force() {
         let (w, h) = (23, 17);
-        let feature = |i: usize| (i * 7919 + 13) % 41 == 0;
+        let feature = |i: usize| (i * 7919 + 13).is_multiple_of(41);
         let fast = distance_transform(w, h, feature);
         for v in 0..h {
             for u in 0..w {
