@@ -19,10 +19,10 @@ struct Case {
     psnr: Option<f64>,
 }
 
-/// Pictures are f32 in [0, 1] here and f64 there: 255ths differ by 3e-8 relatively, and so do differences of
-/// neighbours by 1e-5. PSNR turns a relative error e of the mean square into 4.3 e dB.
-const SSIM_TOLERANCE: f64 = 1e-6;
-const PSNR_TOLERANCE_DB: f64 = 1e-5;
+/// Pictures are f32 in [0, 1] here and f64 there, so that values differ by 3e-8 relatively. Measured: 3e-8 and
+/// 5e-7 dB at most, both for two flat pictures.
+const SSIM_TOLERANCE: f64 = 1e-7;
+const PSNR_TOLERANCE_DB: f64 = 1e-6;
 
 #[test]
 fn psnr_and_ssim_are_those_of_scikit_image() {

@@ -27,7 +27,8 @@ fn too_few_centers_and_unknown_names_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("two.json"), r#"{"000.png": [0, 0, 0], "001.png": [1, 0, 0]}"#).unwrap();
-    fs::write(at.join("other.json"), r#"{"900.png": [0, 0, 0], "001.png": [1, 0, 0], "002.png": [0, 1, 0]}"#).unwrap();
+    fs::write(at.join("other.json"), r#"{"900.png": [0, 0, 0], "001.png": [1, 0, 0], "002.png": [0, 1, 0]}"#)
+        .unwrap();
     fs::write(at.join("words.json"), r#"{"000.png": "here"}"#).unwrap();
     fail(at, "align . --known-centers {}/two.json -o {}/v.json", 1, &["two.json", "at least 3"]);
     fail(at, "align . --known-centers {}/other.json -o {}/v.json", 1, &["900.png", "000.png"]);

@@ -83,6 +83,13 @@ fn a_model_is_not_written_over_the_pictures_it_is_made_of() {
 
 #[cfg(target_os = "linux")]
 #[test]
+fn a_folder_that_takes_no_files_is_found_before_the_work() {
+    fail(Path::new("."), "reconstruct . --views 000 -o /proc/a.ply", 1, &["/proc: "]);
+    fail(Path::new("."), "eval . --json /proc/e.json", 1, &["/proc: "]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
 fn a_full_disk_is_an_error_and_not_a_panic() {
     fail(
         Path::new("."),

@@ -5,15 +5,29 @@ use std::collections::HashMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Makes sure that the file's folder exists, and that the file is no folder, before work is spent on it.
+/// Makes sure that the file's folder exists and takes files, and that the file is no folder, before work is spent
+/// on it.
 pub(crate) fn prepare(path: &Path) -> Result<()> {
     if path.is_dir() {
         return Err(Failure::job(format!("{}: is a folder; expected a file to write", path.display())));
     }
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => prepare_folder(folder),
-        _ => Ok(()),
+    if path.exists() && !path.is_file() {
+        return Ok(()); // a device or a pipe: its folder is not written to
     }
+    let folder = folder_of(path);
+    prepare_folder(folder)?;
+    let probe = tempfile::Builder::new().prefix(".vg-").suffix(".part").tempfile_in(folder);
+    probe.map(drop).map_err(|e| Failure::job(format!("{}: {}", folder.display(), cause(&e))))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Without the temporary file's name, which says nothing to a user.
+fn cause(error: &std::io::Error) -> String {
+    let text = error.to_string();
+    text.split(" at path ").next().unwrap_or(&text).to_owned()
 }
 
 /// Creates the folder with those above it.
@@ -49,19 +63,18 @@ pub(crate) fn refuse_clashes(outputs: &[PathBuf], inputs: &[PathBuf]) -> Result<
 
 /// Writes a file by way of a temporary one beside it, so that nobody meets half of it.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    let failed = |e: std::io::Error| Failure::job(format!("{}: {e}", path.display()));
+    let failed = |e: std::io::Error| Failure::job(format!("{}: {}", path.display(), cause(&e)));
     // A device or a pipe (--report /dev/stderr) is written to as it is.
     if std::fs::metadata(path).is_ok_and(|meta| !meta.is_file()) {
         return std::fs::write(path, bytes).map_err(failed);
     }
     let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    let folder = target.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(".vg-").suffix(".part");
     // Temporary files are private by default; this one becomes an ordinary file.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder).map_err(failed)?;
+    let mut file = builder.tempfile_in(folder_of(&target)).map_err(failed)?;
     file.write_all(bytes).map_err(failed)?;
     file.persist(&target).map_err(|e| failed(e.error))?;
     Ok(())
