@@ -8,7 +8,8 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SymmetryMode {
-    /// Clone what has no counterpart: where no view observed the mirrored place. Everything observed stays.
+    /// Each place is shown by the better of its own observation and its mirror image's: Gaussians are cloned
+    /// where no view saw the mirrored place, and give way where it was seen much better.
     #[default]
     Auto,
     /// The paper's rule: the side with more Gaussians is the reference; the other side becomes its mirror
@@ -37,19 +38,30 @@ pub struct Completion {
     pub reference_side: Side,
     /// Gaussians added as mirror images.
     pub cloned: usize,
-    /// Observed Gaussians given up for mirror images (`Always`).
+    /// Observed Gaussians given up for mirror images: the whole other side (`Always`), or those whose mirrored
+    /// place was seen much better (`Auto`).
     pub replaced: usize,
-    /// Gaussians not cloned because their mirrored place was observed (`Auto`).
+    /// Gaussians not cloned because their mirrored place was observed too (`Auto`).
     pub not_needed: usize,
 }
 
-/// Completes the vehicle. `observed(index)` says whether the mirror image of Gaussian `index` lies where some
-/// view has looked; asked in `Auto` only.
+/// How well the mirrored place of a Gaussian was observed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MirroredPlace {
+    /// Not, or much worse than the Gaussian itself.
+    Unseen,
+    /// About as well.
+    Seen,
+    /// Much better.
+    SeenBetter,
+}
+
+/// Completes the vehicle. `mirrored_place(index)` is asked in `Auto` only.
 pub fn complete(
     gaussians: Gaussians,
     mode: SymmetryMode,
     cameras: &[Camera],
-    observed: impl Fn(usize) -> bool + Sync,
+    mirrored_place: impl Fn(usize) -> MirroredPlace + Sync,
 ) -> (Gaussians, Completion) {
     let reference_side = reference_side(&gaussians, cameras);
     let n = gaussians.len();
@@ -65,11 +77,12 @@ pub fn complete(
         }
         SymmetryMode::Auto => {
             use rayon::prelude::*;
-            let seen: Vec<bool> = (0..n).into_par_iter().map(&observed).collect();
-            let missing = gaussians.filtered(|i| !seen[i]);
+            let places: Vec<_> = (0..n).into_par_iter().map(&mirrored_place).collect();
+            let missing = gaussians.filtered(|i| places[i] == MirroredPlace::Unseen);
+            let mut all = gaussians.filtered(|i| places[i] != MirroredPlace::SeenBetter);
             done.cloned = missing.len();
-            done.not_needed = n - missing.len();
-            let mut all = gaussians;
+            done.replaced = n - all.len();
+            done.not_needed = all.len() - missing.len();
             all.append(&missing.mirrored());
             all
         }
@@ -96,6 +109,7 @@ fn belongs(y: f32, side: Side) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::MirroredPlace::{Seen, SeenBetter, Unseen};
     use super::*;
     use crate::geometry::{Intrinsics, Pose};
 
@@ -119,7 +133,7 @@ mod tests {
 
     #[test]
     fn always_keeps_the_denser_side_and_replaces_the_other_by_its_mirror_image() {
-        let (g, done) = complete(at(&[-1.0, -0.5, 0.7, 0.0]), SymmetryMode::Always, &[], |_| true);
+        let (g, done) = complete(at(&[-1.0, -0.5, 0.7, 0.0]), SymmetryMode::Always, &[], |_| Seen);
         assert_eq!(ys(&g), [-1.0, -0.5, 0.0, 1.0, 0.5, -0.0]);
         assert_eq!((done.reference_side, done.cloned, done.replaced), (Side::Right, 3, 1));
     }
@@ -129,21 +143,22 @@ mod tests {
         let i = Intrinsics { fx: 1.0, fy: 1.0, cx: 0.5, cy: 0.5 };
         let pose = Pose { translation: glam::DVec3::new(0.0, -5.0, 0.0), ..Pose::IDENTITY };
         let right = Camera::pinhole(1, 1, i, pose).unwrap();
-        let side = |cameras: &[Camera]| complete(at(&[-1.0, 1.0]), SymmetryMode::Always, cameras, |_| true).1;
+        let side = |cameras: &[Camera]| complete(at(&[-1.0, 1.0]), SymmetryMode::Always, cameras, |_| Seen).1;
         assert_eq!(side(&[right]).reference_side, Side::Right);
         assert_eq!(side(&[]).reference_side, Side::Left);
     }
 
     #[test]
-    fn auto_clones_only_what_no_view_observed_and_keeps_everything_else() {
-        let (g, done) = complete(at(&[-1.0, -0.5, 0.7]), SymmetryMode::Auto, &[], |i| i == 1);
-        assert_eq!(ys(&g), [-1.0, -0.5, 0.7, 1.0, -0.7]);
-        assert_eq!((done.cloned, done.not_needed), (2, 1));
+    fn auto_clones_what_was_not_seen_across_and_drops_what_was_seen_better_there() {
+        let places = [Unseen, Seen, SeenBetter, Seen];
+        let (g, done) = complete(at(&[-1.0, -0.5, 0.9, 0.5]), SymmetryMode::Auto, &[], |i| places[i]);
+        assert_eq!(ys(&g), [-1.0, -0.5, 0.5, 1.0]);
+        assert_eq!((done.cloned, done.replaced, done.not_needed), (1, 1, 2));
     }
 
     #[test]
     fn never_changes_nothing() {
         let g = at(&[-1.0, 0.2]);
-        assert_eq!(complete(g.clone(), SymmetryMode::Never, &[], |_| false).0, g);
+        assert_eq!(complete(g.clone(), SymmetryMode::Never, &[], |_| Unseen).0, g);
     }
 }

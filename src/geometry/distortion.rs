@@ -1,5 +1,11 @@
 //! Lens distortion on normalised image coordinates (x/z, y/z), in COLMAP's parametrisation.
 
+/// Rays at 90 degrees have no place on a pinhole image plane; stop a little before, at 89.
+const MAX_THETA: f64 = 1.553;
+
+/// A determinant of d distorted / d undistorted that is not above this means a fold.
+const MIN_DETERMINANT: f64 = 1e-9;
+
 /// How a lens bends the pinhole picture. Names and formulas are COLMAP's (`models.h`).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub enum Distortion {
@@ -83,29 +89,60 @@ impl Distortion {
         Some(guess)
     }
 
+    /// Newton's method with backtracking: where the image is nearly folded a full step overshoots, and may land
+    /// beyond the fold. A step is taken only if it brings the value nearer to `target` and stays unfolded.
     fn newton(&self, target: [f64; 2], start: [f64; 2]) -> Option<[f64; 2]> {
-        const MAX_ITERATIONS: usize = 30;
-        let mut p = start;
-        for _ in 0..MAX_ITERATIONS {
+        const MAX_ITERATIONS: usize = 60;
+        const MAX_HALVINGS: usize = 30;
+        let error_at = |p: [f64; 2]| {
             let value = self.distort(p);
-            let jacobian = self.jacobian(p);
-            let det = jacobian[0][0] * jacobian[1][1] - jacobian[0][1] * jacobian[1][0];
+            [target[0] - value[0], target[1] - value[1]]
+        };
+        let mut p = start;
+        let mut error = error_at(p);
+        let mut jacobian = self.jacobian(p);
+        'newton: for _ in 0..MAX_ITERATIONS {
+            let det = determinant(&jacobian);
             // A determinant that is not positive means that the image has folded over.
-            if det.is_nan() || det <= 1e-9 {
+            if det.is_nan() || det <= MIN_DETERMINANT {
                 return None;
             }
-            let e = [target[0] - value[0], target[1] - value[1]];
             let step = [
-                (jacobian[1][1] * e[0] - jacobian[0][1] * e[1]) / det,
-                (jacobian[0][0] * e[1] - jacobian[1][0] * e[0]) / det,
+                (jacobian[1][1] * error[0] - jacobian[0][1] * error[1]) / det,
+                (jacobian[0][0] * error[1] - jacobian[1][0] * error[0]) / det,
             ];
-            p = [p[0] + step[0], p[1] + step[1]];
             if step[0].hypot(step[1]) < 1e-13 * (1.0 + p[0].hypot(p[1])) {
-                return Some(p);
+                return Some([p[0] + step[0], p[1] + step[1]]);
+            }
+            let mut length = 1.0;
+            for _ in 0..MAX_HALVINGS {
+                let next = [p[0] + length * step[0], p[1] + length * step[1]];
+                let next_error = error_at(next);
+                if next_error[0].hypot(next_error[1]) < error[0].hypot(error[1]) {
+                    let next_jacobian = self.jacobian(next);
+                    if determinant(&next_jacobian) > 0.0 {
+                        (p, error, jacobian) = (next, next_error, next_jacobian);
+                        continue 'newton;
+                    }
+                }
+                length *= 0.5;
+            }
+            break; // no step helps: as near as rounding allows, or stuck at a fold
+        }
+        (error[0].hypot(error[1]) < 1e-9).then_some(p)
+    }
+
+    /// Whether the model keeps its sense here: a ray a little farther out maps a little farther out.
+    pub(super) fn is_unfolded_at(&self, p: [f64; 2]) -> bool {
+        match *self {
+            Self::None => true,
+            Self::Brown { .. } => determinant(&self.jacobian(p)) > MIN_DETERMINANT,
+            Self::Fisheye { k } => {
+                let theta = p[0].hypot(p[1]).atan();
+                let h = 1e-6;
+                theta <= MAX_THETA && fisheye_angle(&k, theta + h) > fisheye_angle(&k, (theta - h).max(0.0))
             }
         }
-        let value = self.distort(p);
-        ((value[0] - target[0]).hypot(value[1] - target[1]) < 1e-9).then_some(p)
     }
 
     /// d distorted / d undistorted, rows (x, y), by central differences: the models are smooth and this runs
@@ -117,6 +154,10 @@ impl Distortion {
         let d = 0.5 / h;
         [[(xp[0] - xm[0]) * d, (yp[0] - ym[0]) * d], [(xp[1] - xm[1]) * d, (yp[1] - ym[1]) * d]]
     }
+}
+
+fn determinant(m: &[[f64; 2]; 2]) -> f64 {
+    m[0][0] * m[1][1] - m[0][1] * m[1][0]
 }
 
 fn radial_numerator(k: &[f64; 6], r2: f64) -> f64 {
@@ -134,8 +175,6 @@ fn fisheye_angle(k: &[f64; 4], theta: f64) -> f64 {
 
 /// theta in (0, pi/2) with `fisheye_angle(theta) = target` on the first monotone stretch, or `None`.
 fn solve_fisheye(k: &[f64; 4], target: f64) -> Option<f64> {
-    // Rays at 90 degrees have no place on a pinhole image plane; stop a little before.
-    const MAX_THETA: f64 = 1.553; // 89 degrees
     const SCAN: usize = 256;
     let mut below = 0.0;
     for i in 1..=SCAN {

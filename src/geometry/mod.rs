@@ -11,6 +11,7 @@ pub mod camera;
 pub mod distortion;
 pub mod frame;
 pub mod pose;
+pub(crate) mod unfolded;
 
 pub use align::Similarity;
 pub use camera::{Camera, CameraModel, Intrinsics};

@@ -1,57 +1,92 @@
-//! OpenEXR, as far as a depth map needs it: one flat layer with a channel named Z, depth, Y or R.
+//! OpenEXR, as far as a depth map needs it: one flat layer with a channel named Z, depth, Y, V or R.
 
 use super::depth::checked_size;
 use crate::error::{Error, Result};
-use exr::prelude::{FlatSamples, ReadChannels, ReadLayers};
+use exr::meta::MetaData;
+use exr::meta::attribute::Text;
+use exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel};
 use std::io::Cursor;
 use std::path::Path;
 
-/// Channel names that hold depth, best first.
-const CHANNELS: [&str; 6] = ["Z", "depth", "depth.Z", "Depth.Z", "Y", "R"];
-
-/// Most bytes of all channels together: beside depth, a renderer's file may hold colour and normals.
-const MAX_DECODED: u64 = 2 << 30;
-
-/// Width, height and values in row order.
+/// Width, height and values in row order. Other channels are decoded and dropped, block by block.
 pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<(u32, u32, Vec<f32>)> {
-    let failed = |e: exr::error::Error| Error::format(path, "exr", e.to_string());
+    let failed = |e: exr::error::Error| Error::format(path, "exr", format!("{e}; allowed: a whole file"));
     // The header first: its numbers are checked before anything is allocated by them.
-    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(failed)?;
-    let mut decoded = 0u64;
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(failed)?;
     for header in &meta.headers {
-        let size = header.layer_size;
-        checked_size(path, size.width() as u64, size.height() as u64)?;
-        decoded += size.area() as u64 * 4 * header.channels.list.len() as u64;
+        checked_size(path, header.layer_size.width() as u64, header.layer_size.height() as u64)?;
     }
-    if decoded > MAX_DECODED {
-        return Err(Error::format(path, "channels", format!("{decoded} bytes; allowed: {MAX_DECODED}")));
-    }
+    let channel = depth_channel(&meta, path)?;
 
     let image = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
-        .all_channels()
+        .specific_channels()
+        .required(channel)
+        .collect_pixels(
+            |size, _| (size.width(), vec![0.0; size.area()]),
+            |(width, values): &mut (usize, Vec<f32>), at, (value,): (f32,)| {
+                if let Some(slot) = values.get_mut(at.y() * *width + at.x()) {
+                    *slot = value;
+                }
+            },
+        )
         .first_valid_layer()
         .all_attributes()
+        .non_parallel()
         .from_buffered(Cursor::new(bytes))
         .map_err(failed)?;
     let layer = image.layer_data;
     let (width, height) = checked_size(path, layer.size.width() as u64, layer.size.height() as u64)?;
-    let list = &layer.channel_data.list;
-    let find = |name: &&str| list.iter().find(|channel| channel.name.eq_case_insensitive(name));
-    let Some(channel) = CHANNELS.iter().find_map(find) else {
-        let names: Vec<String> = list.iter().take(8).map(|c| c.name.to_string()).collect();
-        let reason = format!("{names:?}; allowed: one named Z, depth, Y or R");
-        return Err(Error::format(path, "channels", reason));
-    };
-    let values: Vec<f32> = match &channel.sample_data {
-        FlatSamples::F16(v) => v.iter().map(|v| v.to_f32()).collect(),
-        FlatSamples::F32(v) => v.clone(),
-        FlatSamples::U32(v) => v.iter().map(|&v| v as f32).collect(),
-    };
-    if values.len() != width as usize * height as usize {
-        let reason = format!("{} samples for {width}x{height}; allowed: one a pixel", values.len());
-        return Err(Error::format(path, "channels", reason));
+    Ok((width, height, layer.channel_data.pixels.1))
+}
+
+/// The channel that says by its name that it is depth; where none does, the only colour or luminance.
+fn depth_channel(meta: &MetaData, path: &Path) -> Result<Text> {
+    let names = || meta.headers.iter().flat_map(|h| &h.channels.list).map(|channel| &channel.name);
+    for wanted in ["z", "depth", "y", "v", "r"] {
+        // Renderers put the layer before it: `ViewLayer.Depth.Z`.
+        let answers = |name: &&Text| {
+            let name = name.to_string().to_ascii_lowercase();
+            name == wanted || (name.ends_with(&format!(".{wanted}")) && ["z", "depth"].contains(&wanted))
+        };
+        if let Some(name) = names().find(answers) {
+            return Ok(name.clone());
+        }
     }
-    Ok((width, height, values))
+    let found: Vec<String> = names().take(8).map(ToString::to_string).collect();
+    Err(Error::format(path, "channels", format!("{found:?}; allowed: one named Z, depth, Y, V or R")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use exr::prelude::*;
+
+    fn file(channels: Vec<AnyChannel<FlatSamples>>, compression: Compression) -> Vec<u8> {
+        let encoding = Encoding { compression, ..Encoding::default() };
+        let channels = AnyChannels::sort(channels.into());
+        let layer = Layer::new((3, 2), LayerAttributes::default(), encoding, channels);
+        let mut bytes = Cursor::new(Vec::new());
+        Image::from_layer(layer).write().to_buffered(&mut bytes).unwrap();
+        bytes.into_inner()
+    }
+
+    #[test]
+    fn the_depth_channel_is_found_among_others_in_any_number_format_and_compression() {
+        let values = [1.0f32, 2.0, 3.0, 4.0, 5.5, 0.0];
+        let halves = values.map(f16::from_f32).to_vec();
+        let z = || AnyChannel::new("ViewLayer.Depth.Z", FlatSamples::F32(values.to_vec()));
+        let r = || AnyChannel::new("R", FlatSamples::F16(vec![f16::ONE; 6]));
+        let y = AnyChannel::new("Y", FlatSamples::F16(halves));
+        for compression in [Compression::Uncompressed, Compression::RLE, Compression::ZIP16] {
+            for channels in [vec![z()], vec![r(), z()], vec![y.clone(), r()]] {
+                let found = decode(&file(channels, compression), Path::new("d.exr")).unwrap();
+                assert_eq!(found, (3, 2, values.to_vec()));
+            }
+        }
+        let strange = AnyChannel::new("id", FlatSamples::U32(vec![7; 6]));
+        let error = decode(&file(vec![strange], Compression::RLE), Path::new("d.exr")).unwrap_err();
+        assert!(error.to_string().contains("d.exr: channels: [\"id\"]"), "{error}");
+    }
 }

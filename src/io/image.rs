@@ -123,20 +123,24 @@ fn image_error(path: &Path, error: image::ImageError) -> Error {
 /// cannot occur inside coded data, so one after the first scan's start means that the file is whole.
 fn jpeg_is_whole(bytes: &[u8], path: &Path) -> Result<()> {
     const START_OF_SCAN: u8 = 0xda;
+    const END_OF_IMAGE: [u8; 2] = [0xff, 0xd9];
     let mut at = 2;
-    while let Some(&[0xff, marker, high, low]) = bytes.get(at..at + 4) {
-        match marker {
-            0xff => at += 1,
-            START_OF_SCAN => {
-                if bytes[at..].windows(2).any(|pair| pair == [0xff, 0xd9]) {
-                    return Ok(());
-                }
-                break;
+    loop {
+        match bytes.get(at..at + 4) {
+            Some(&[0xff, 0xff, ..]) => at += 1,
+            Some(&[0xff, START_OF_SCAN, ..]) if bytes[at..].windows(2).any(|b| b == END_OF_IMAGE) => break,
+            Some(&[0xff, marker, high, low]) if marker != START_OF_SCAN => {
+                at += 2 + usize::from(u16::from_be_bytes([high, low]));
             }
-            _ => at += 2 + usize::from(u16::from_be_bytes([high, low])),
+            // Something between the segments: the decoder knows better what may be there.
+            Some(&[other, ..]) if other != 0xff => break,
+            _ => {
+                let reason = "ends before its end-of-image marker; allowed: a whole JPEG";
+                return Err(Error::format(path, "picture", reason));
+            }
         }
     }
-    Err(Error::format(path, "picture", "ends before its end-of-image marker; allowed: a whole JPEG"))
+    Ok(())
 }
 
 fn transparency(decoded: &DynamicImage) -> Option<Vec<u8>> {
@@ -205,4 +209,35 @@ fn write_png(path: &Path, width: u32, height: u32, bytes: &[u8], color: Extended
             .write_image(bytes, width, height, color)
             .map_err(std::io::Error::other)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_jpeg_cut_off_anywhere_is_refused() {
+        let mut bytes = Cursor::new(Vec::new());
+        let noise =
+            |u: u32, v: u32| image::Rgb([(u * 37 % 251) as u8, (v * 91 % 241) as u8, (u * v % 256) as u8]);
+        let picture = image::RgbImage::from_fn(64, 48, noise);
+        picture.write_to(&mut bytes, ImageFormat::Jpeg).unwrap();
+        let bytes = bytes.into_inner();
+        let decoded = decode(&bytes, Path::new("a.jpg")).unwrap();
+        assert_eq!((decoded.image.width(), decoded.image.height(), decoded.alpha), (64, 48, None));
+        for end in 0..bytes.len() - 1 {
+            assert!(decode(&bytes[..end], Path::new("a.jpg")).is_err(), "{end} of {}", bytes.len());
+        }
+    }
+
+    #[test]
+    fn a_16_bit_grey_picture_reads_as_8_bit_colour_and_as_a_mask() {
+        let mut bytes = Cursor::new(Vec::new());
+        let deep = image::ImageBuffer::from_fn(3, 2, |u, _| image::Luma([u as u16 * 257 * 100]));
+        DynamicImage::ImageLuma16(deep).write_to(&mut bytes, ImageFormat::Png).unwrap();
+        let decoded = decode(bytes.get_ref(), Path::new("a.png")).unwrap();
+        assert_eq!(decoded.image.pixels()[..3], [[0; 3], [100; 3], [200; 3]]);
+        let (mask, largest) = decode_mask(bytes.get_ref(), Path::new("a.png")).unwrap();
+        assert_eq!((mask.vehicle_pixels(), largest), (2, 200));
+    }
 }

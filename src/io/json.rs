@@ -22,3 +22,13 @@ pub(super) fn parse<T: DeserializeOwned>(bytes: &[u8], path: &Path) -> Result<T>
     deserializer.end().map_err(|e| Error::format(path, "end of document", e.to_string()))?;
     Ok(value)
 }
+
+/// The same of a document that is an object; without this, an array would be taken for the keys' values in order.
+pub(super) fn parse_object<T: DeserializeOwned>(bytes: &[u8], path: &Path) -> Result<T> {
+    match bytes.trim_ascii_start().first() {
+        Some(b'[' | b'"' | b'0'..=b'9' | b'-') => {
+            Err(Error::format(path, "document", "not an object; allowed: { ... }"))
+        }
+        _ => parse(bytes, path),
+    }
+}

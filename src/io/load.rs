@@ -17,9 +17,14 @@ pub(super) fn load(views: &[SceneView]) -> Result<(Scene, Vec<String>)> {
     }
     let loaded: Vec<(View, Vec<String>)> = views.par_iter().map(load_view).collect::<Result<_>>()?;
     let (views, notes): (Vec<View>, Vec<Vec<String>>) = loaded.into_iter().unzip();
+    let mut notes: Vec<String> = notes.into_iter().flatten().collect();
+    if views.iter().any(|v| v.mask.is_some()) {
+        let unmasked = views.iter().filter(|v| v.mask.is_none());
+        notes.extend(unmasked.map(|v| format!("{}: no mask, though other views have one", v.name)));
+    }
     let scene = Scene { views };
     scene.validate()?;
-    Ok((scene, notes.into_iter().flatten().collect()))
+    Ok((scene, notes))
 }
 
 fn load_view(listed: &SceneView) -> Result<(View, Vec<String>)> {

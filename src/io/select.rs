@@ -17,8 +17,9 @@ pub(super) fn select(views: &[ListedView], names: &[String]) -> Result<Vec<usize
 fn one(views: &[ListedView], name: &str, position: usize) -> Result<usize> {
     let file_name = |path: &str| Path::new(path).file_name().map(|f| f.to_string_lossy().into_owned());
     let stem = |path: &str| Path::new(path).with_extension("").to_string_lossy().into_owned();
-    let levels: [&dyn Fn(&ListedView) -> bool; 4] = [
-        &|view| view.path_in_file == name || view.name == name,
+    let levels: [&dyn Fn(&ListedView) -> bool; 5] = [
+        &|view| view.path_in_file == name,
+        &|view| view.name == name,
         &|view| file_name(&view.name).as_deref() == Some(name),
         &|view| stem(&view.path_in_file) == name || stem(&view.name) == name,
         &|view| file_name(&stem(&view.name)).as_deref() == Some(name),

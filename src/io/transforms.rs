@@ -138,7 +138,7 @@ impl<'de> Deserialize<'de> for Rows {
 
 /// Reads the text of a `transforms.json`; `path` is for messages only.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Transforms> {
-    let document: DocumentJson = super::json::parse(bytes, path)?;
+    let document: DocumentJson = super::json::parse_object(bytes, path)?;
     if document.frames.is_empty() {
         return Err(Error::format(path, "frames", "empty; allowed: at least one frame"));
     }

@@ -5,6 +5,7 @@ use super::plan;
 use super::report::{Clock, InputError, Report, peak_rss_bytes};
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
+use crate::head::surfel::FOOTPRINT_SIGMA_PX;
 use crate::head::{GaussianHead, SurfelHead};
 use crate::metrics;
 use crate::prior::{DepthPrior, Geometry, GivenDepth, HullPrior};
@@ -12,8 +13,8 @@ use crate::progress::{Context, ProgressCallback};
 use crate::render::{CpuRenderer, RenderOptions, Renderer};
 use crate::scene::visibility::{Observer, Sight};
 use crate::scene::{Scene, View, undistort};
-use crate::symmetry::{self, SymmetryMode};
-use glam::Vec3;
+use crate::symmetry::{self, MirroredPlace, SymmetryMode};
+use glam::{Quat, Vec3};
 
 /// A finished reconstruction.
 #[derive(Clone, Debug)]
@@ -136,7 +137,9 @@ fn point_cloud(views: &[View], geometry: &Geometry) -> PointCloud {
     cloud
 }
 
-/// Cloning; in `Auto` a mirror image is not needed where a view saw its place: a surface, or nothing.
+/// Cloning; in `Auto` the mirrored place counts as seen where a view looked at it and saw a surface, or saw
+/// through it to another one. The background says nothing here: with poses a pixel off, the rim of every mirror
+/// image lies in it.
 fn complete(
     gaussians: Gaussians,
     mode: SymmetryMode,
@@ -145,15 +148,43 @@ fn complete(
 ) -> (Gaussians, symmetry::Completion) {
     /// Depth from different views agrees to about this, metres.
     const SURFACE_M: f32 = 0.06;
+    /// Seen at this many times the resolution is much better.
+    const MUCH_BETTER: f32 = 1.5;
     let observers: Vec<Observer> =
         views.iter().zip(&geometry.depths).map(|(v, d)| Observer::new(v, d)).collect();
     let cameras: Vec<_> = views.iter().map(|v| v.camera).collect();
-    let means = gaussians.means().to_vec();
+    // Moved out because `gaussians` goes where the closure cannot follow.
+    let places: Vec<(Vec3, Vec3, f32)> = match mode {
+        SymmetryMode::Auto => (0..gaussians.len()).map(|i| mirrored_place(&gaussians, i)).collect(),
+        _ => Vec::new(),
+    };
     symmetry::complete(gaussians, mode, &cameras, |i| {
-        let [x, y, z] = means[i];
-        let place = Vec3::new(x, -y, z);
-        observers.iter().any(|o| !matches!(o.sight(place, SURFACE_M), Sight::Silent))
+        let (place, normal, own) = places[i];
+        let mut mirrored = MirroredPlace::Unseen;
+        for observer in &observers {
+            let resolution = match observer.sight(place, SURFACE_M) {
+                Sight::Surface { .. } => observer.resolution(place, normal),
+                Sight::Through => own,
+                Sight::Background | Sight::Silent => 0.0,
+            };
+            if resolution > MUCH_BETTER * own {
+                return MirroredPlace::SeenBetter;
+            }
+            if resolution > own / MUCH_BETTER {
+                mirrored = MirroredPlace::Seen;
+            }
+        }
+        mirrored
     })
+}
+
+/// Centre and normal of the mirror image of a surfel, and the resolution at which the original was seen.
+fn mirrored_place(gaussians: &Gaussians, i: usize) -> (Vec3, Vec3, f32) {
+    let flip = Vec3::new(1.0, -1.0, 1.0);
+    let [w, x, y, z] = gaussians.rotations()[i];
+    let normal = Quat::from_xyzw(x, y, z, w) * Vec3::Z;
+    let coarsest = gaussians.scales()[i].into_iter().fold(0.0, f32::max);
+    (Vec3::from_array(gaussians.means()[i]) * flip, normal * flip, FOOTPRINT_SIGMA_PX / coarsest)
 }
 
 /// The model drawn into the views it came from.

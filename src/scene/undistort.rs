@@ -7,7 +7,9 @@
 use super::mask::{Label, Mask};
 use super::{DepthMap, RgbImage, View};
 use crate::error::{Error, Result};
+use crate::geometry::unfolded::Unfolded;
 use crate::geometry::{Camera, Distortion, Intrinsics};
+use rayon::prelude::*;
 
 /// The pinhole may be this many times the source's width and height; wider corners are cut.
 const MAX_GROWTH: f64 = 2.0;
@@ -95,22 +97,23 @@ pub fn pinhole_for(source: &Camera) -> Result<Camera> {
 
 /// Position in the source's picture of every pixel centre of the pinhole, in row order.
 fn source_pixels(pinhole: &Camera, source: &Camera) -> Vec<[f32; 2]> {
-    let mut map = Vec::with_capacity(pinhole.width as usize * pinhole.height as usize);
-    for v in 0..pinhole.height {
-        for u in 0..pinhole.width {
-            let normalized =
-                pinhole.intrinsics.normalized_from_pixel([f64::from(u) + 0.5, f64::from(v) + 0.5]);
-            let distorted = source.distortion.distort(normalized);
+    let normalized =
+        |u: u32, v: u32| pinhole.intrinsics.normalized_from_pixel([f64::from(u) + 0.5, f64::from(v) + 0.5]);
+    let corners = [(0, 0), (pinhole.width, 0), (0, pinhole.height), (pinhole.width, pinhole.height)];
+    let reach = corners.map(|(u, v)| normalized(u, v)).iter().fold(0.0f64, |r, n| r.max(n[0].hypot(n[1])));
+    let unfolded = Unfolded::new(&source.distortion, reach);
+    let row = |v: u32| {
+        let unfolded = &unfolded;
+        (0..pinhole.width).map(move |u| {
+            let normalized = normalized(u, v);
             // A polynomial that has folded back lands inside the picture though no light came that way.
-            let folded = source
-                .distortion
-                .undistort(distorted)
-                .is_none_or(|back| (back[0] - normalized[0]).hypot(back[1] - normalized[1]) > 1e-6);
-            let p = source.intrinsics.pixel_from_normalized(distorted);
-            map.push(if folded { [f32::NEG_INFINITY; 2] } else { p.map(|c| c as f32) });
-        }
-    }
-    map
+            if !unfolded.contains(normalized) {
+                return [f32::NEG_INFINITY; 2];
+            }
+            source.intrinsics.pixel_from_normalized(source.distortion.distort(normalized)).map(|c| c as f32)
+        })
+    };
+    (0..pinhole.height).into_par_iter().flat_map_iter(row).collect()
 }
 
 /// Bilinear sample; pixel centres at (u + 0.5, v + 0.5), edges repeated.

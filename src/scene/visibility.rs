@@ -10,7 +10,9 @@ use glam::{Mat3, Vec3};
 pub enum Sight {
     /// The view makes no statement: the point is behind it, outside its picture, hidden, or its pixel unknown.
     Silent,
-    /// The view sees through the point: to the background, or to a surface behind it.
+    /// The view sees the background there.
+    Background,
+    /// The view sees through the point to a surface behind it.
     Through,
     /// The point lies on the surface this pixel (row-order index) shows.
     Surface {
@@ -60,7 +62,7 @@ impl<'a> Observer<'a> {
         }
         let pixel = v as usize * camera.width as usize + u as usize;
         match self.view.mask.as_ref().map_or(Label::Vehicle, |mask| mask.labels()[pixel]) {
-            Label::Background => Sight::Through,
+            Label::Background => Sight::Background,
             Label::Unknown => Sight::Silent,
             Label::Vehicle => {
                 let surface = self.depth.depth()[pixel];
