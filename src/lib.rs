@@ -30,3 +30,8 @@ pub use error::{Error, Result};
 pub use gaussians::Gaussians;
 pub use geometry::{Camera, Pose};
 pub use scene::{Scene, View};
+
+/// Compiles the README's example.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -4,8 +4,10 @@
 //! are compared over the full frame, unmasked, so what spills over the silhouette costs.
 
 mod ssim;
+mod views;
 
 pub use ssim::ssim;
+pub use views::ViewErrors;
 
 use crate::scene::View;
 use crate::scene::mask::Label;

@@ -1,0 +1,96 @@
+//! Time of a reconstruction, stage by stage, with its error on the unseen side beside it, on the bundled sample.
+//!
+//! `cargo bench --bench reconstruct` prints one row per depth source and number of threads: medians over the runs,
+//! what part of the whole the cloning takes, and the highest memory of the process during these runs.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use vg::io::{SceneOptions, open_scene};
+use vg::metrics::ViewErrors;
+use vg::pipeline::{Options, PriorChoice, Reconstruction, Report, reconstruct};
+use vg::render::{CpuRenderer, RenderOptions, Renderer};
+use vg::{Result, Scene};
+
+/// Timed runs of each setting, after one that is not timed.
+const RUNS: usize = 7;
+
+fn main() -> Result<()> {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/sedan");
+    let open = |names: [&str; 4], load_depth: bool| {
+        let views = Some(names.map(String::from).to_vec());
+        open_scene(&scene, &SceneOptions { views, load_depth, ..SceneOptions::default() }).map(|s| s.scene)
+    };
+    let (inputs, blind) = (["000", "001", "002", "003"], false);
+    let tests = open(["004", "005", "006", "007"], blind)?;
+    println!("{RUNS} runs each, medians in ms; errors on the four unseen views of the other side\n");
+    for prior in [PriorChoice::Hull, PriorChoice::Given] {
+        let scene = open(inputs, prior == PriorChoice::Given)?;
+        for threads in [1, 2] {
+            row(&scene, &tests, &Options { prior, threads, ..Options::default() })?;
+        }
+    }
+    Ok(())
+}
+
+fn row(scene: &Scene, tests: &Scene, options: &Options) -> Result<()> {
+    forget_peak_memory();
+    let first = run(scene, options)?;
+    let errors = errors(&first, tests)?;
+    let reports: Vec<Report> = (0..RUNS).map(|_| Ok(run(scene, options)?.report)).collect::<Result<_>>()?;
+    let total = median(reports.iter().map(|r| r.total_ms));
+    let stages: Vec<(&str, f64)> = (0..first.report.stages.len())
+        .map(|i| (first.report.stages[i].name, median(reports.iter().map(|r| r.stages[i].ms))))
+        .collect();
+    let of = |name: &str| stages.iter().find(|s| s.0 == name).map_or(0.0, |s| s.1);
+    let memory = reports.iter().filter_map(|r| r.peak_rss_bytes).max().unwrap_or(0);
+
+    println!(
+        "{} on {} thread{}: {total:.0} ms, PSNR {:.2} dB, SSIM {:.3}, IoU {:.3}, {} Gaussians, peak {:.0} MB",
+        first.report.prior,
+        options.threads,
+        if options.threads == 1 { "" } else { "s" },
+        errors.psnr_db,
+        errors.ssim.unwrap_or(f64::NAN),
+        errors.silhouette_iou,
+        first.gaussians.len(),
+        memory as f64 / 1e6,
+    );
+    let cells: Vec<String> = stages.iter().map(|(name, ms)| format!("{name} {ms:.1}")).collect();
+    println!("  {}", cells.join(", "));
+    // The check draws the model into its input views, which a caller need not wait for to have the model.
+    let cloning = of("symmetry");
+    println!(
+        "  cloning takes {:.1} % of the whole, {:.1} % without the check\n",
+        100.0 * cloning / total,
+        100.0 * cloning / (total - of("check")),
+    );
+    Ok(())
+}
+
+fn run(scene: &Scene, options: &Options) -> Result<Reconstruction> {
+    reconstruct(scene, options, &mut |_| ControlFlow::Continue(()))
+}
+
+fn errors(made: &Reconstruction, tests: &Scene) -> Result<ViewErrors> {
+    let renderer = CpuRenderer::new();
+    let errors: Vec<ViewErrors> = tests
+        .views
+        .iter()
+        .map(|view| {
+            let drawn = renderer.render(&made.gaussians, &view.camera, &RenderOptions::default())?;
+            Ok(ViewErrors::of(&drawn, view))
+        })
+        .collect::<Result<_>>()?;
+    Ok(ViewErrors::mean(&errors).expect("four views"))
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Linux forgets the highest memory so far when asked; elsewhere the rows show the highest of all so far.
+fn forget_peak_memory() {
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+}

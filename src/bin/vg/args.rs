@@ -1,0 +1,290 @@
+//! The command line: commands, options, and what their values may be.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+use vg::pipeline::{Keep, Options, PriorChoice};
+use vg::render::Background;
+use vg::symmetry::SymmetryMode;
+
+/// Reconstructs a vehicle from posed, masked photographs of one side as metric 3D Gaussians.
+#[derive(Parser)]
+#[command(name = "vg", version, after_help = EXIT_CODES, arg_required_else_help = true, infer_long_args = false)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+const EXIT_CODES: &str = "Exit codes: 0 the job is done; 1 it failed (bad data, a file that cannot be read or \
+written); 2 the arguments make no sense; 130 interrupted.\nErrors are one line on standard error: vg: error: <cause>.";
+
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    /// Make a Gaussian model of the vehicle in a scene
+    Reconstruct(ReconstructArgs),
+    /// Draw a model as a scene's cameras see it, or all around it
+    Render(RenderArgs),
+    /// Tell what is in a PLY file, and what is wrong with it
+    Info(InfoArgs),
+    /// Reconstruct from some views of scenes and measure the error in others
+    Eval(EvalArgs),
+    /// Run the whole job on the sample inside this program
+    Demo(DemoArgs),
+    /// Find the similarity from a scene's world to the vehicle's frame, from known camera centres
+    Align(AlignArgs),
+}
+
+/// How a reconstruction is made; shared by `reconstruct` and `eval`.
+#[derive(Args)]
+pub(crate) struct MethodArgs {
+    /// Depth source: the scene's own depth, the visual hull, or (auto) the first if every used view has depth
+    #[arg(long, value_enum, default_value_t = Prior::Auto)]
+    pub(crate) prior: Prior,
+    /// Mirror what was not observed (auto), all of the denser side (always), or nothing (never)
+    #[arg(long, value_enum, default_value_t = Symmetry::Auto)]
+    symmetry: Symmetry,
+    /// Length, width and height of the vehicle in metres, where known
+    #[arg(long = "box", value_name = "L,W,H", value_parser = vehicle_size)]
+    vehicle_size: Option<VehicleSize>,
+    /// Highest degree of the spherical harmonics that hold the colour
+    #[arg(long, value_name = "0..3", default_value_t = 2, value_parser = clap::value_parser!(u8).range(0..=3))]
+    sh_degree: u8,
+    /// What the plan may not leave out, separated by commas
+    #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
+    keep: Vec<KeepItem>,
+    /// Worker threads; 0 means one per core
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) threads: usize,
+}
+
+impl MethodArgs {
+    /// For the library.
+    pub(crate) fn options(&self) -> Options {
+        let kept = |item: KeepItem| self.keep.contains(&item) || self.keep.contains(&KeepItem::All);
+        Options {
+            prior: match self.prior {
+                Prior::Auto => PriorChoice::Auto,
+                Prior::Given => PriorChoice::Given,
+                Prior::Hull => PriorChoice::Hull,
+            },
+            symmetry: match self.symmetry {
+                Symmetry::Auto => SymmetryMode::Auto,
+                Symmetry::Always => SymmetryMode::Always,
+                Symmetry::Never => SymmetryMode::Never,
+            },
+            vehicle_size: self.vehicle_size.map(|s| s.0),
+            sh_degree: self.sh_degree,
+            keep: Keep {
+                duplicate_views: kept(KeepItem::DuplicateViews),
+                overlap: kept(KeepItem::Overlap),
+                silhouette_edge: kept(KeepItem::SilhouetteEdge),
+                floaters: kept(KeepItem::Floaters),
+                sh_bands: kept(KeepItem::ShBands),
+            },
+            threads: self.threads,
+            points: false,
+        }
+    }
+}
+
+/// What a scene's files do not say.
+#[derive(Args)]
+pub(crate) struct FrameArgs {
+    /// Similarity from the scene's world to the vehicle's frame, JSON; a COLMAP model needs one
+    #[arg(long, value_name = "FILE")]
+    pub(crate) vehicle_from_world: Option<PathBuf>,
+}
+
+/// Which of the scene's views.
+#[derive(Args)]
+pub(crate) struct ViewsArgs {
+    /// Views to use, by path, file name, or file name without extension; all if not given
+    #[arg(long, value_name = "NAME,NAME,...", value_delimiter = ',')]
+    pub(crate) views: Option<Vec<String>>,
+}
+
+/// Numbers in depth files.
+#[derive(Args)]
+pub(crate) struct DepthArgs {
+    /// Metres per number in the depth files, instead of what the scene says
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    pub(crate) depth_scale: Option<f64>,
+}
+
+#[derive(Args)]
+pub(crate) struct ReconstructArgs {
+    /// A transforms.json, a folder with one, or a COLMAP folder (images/, masks/, sparse/0)
+    pub(crate) scene: PathBuf,
+    #[command(flatten)]
+    pub(crate) views: ViewsArgs,
+    #[command(flatten)]
+    pub(crate) method: MethodArgs,
+    #[command(flatten)]
+    pub(crate) frame: FrameArgs,
+    #[command(flatten)]
+    pub(crate) depth: DepthArgs,
+    /// The model, a PLY file in 3DGS's layout
+    #[arg(short, long, value_name = "ASSET.ply")]
+    pub(crate) output: PathBuf,
+    /// Write the metric coloured point cloud as well
+    #[arg(long, value_name = "P.ply")]
+    pub(crate) points: Option<PathBuf>,
+    /// Write what was done: settings, stage times, counts, what was left out and why, errors
+    #[arg(long, value_name = "R.json")]
+    pub(crate) report: Option<PathBuf>,
+}
+
+#[derive(Args)]
+#[command(group(clap::ArgGroup::new("where").required(true).args(["cameras", "turntable"])))]
+pub(crate) struct RenderArgs {
+    /// The model, a PLY file in 3DGS's layout
+    pub(crate) asset: PathBuf,
+    /// Draw what the cameras of this scene see: <image stem>.png each
+    #[arg(long, value_name = "SCENE")]
+    pub(crate) cameras: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) views: ViewsArgs,
+    #[command(flatten)]
+    pub(crate) frame: FrameArgs,
+    /// Draw N pictures from all around instead
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with_all = ["views", "vehicle_from_world"])]
+    pub(crate) turntable: Option<u32>,
+    /// Size of the turntable's pictures, pixels
+    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = picture_size, conflicts_with = "cameras")]
+    pub(crate) size: (u32, u32),
+    /// What is behind the vehicle; a colour as three numbers from 0 to 255
+    #[arg(long, value_name = "white|black|R,G,B|transparent", default_value = "white", value_parser = background)]
+    pub(crate) background: Background,
+    /// Write depth too: DIR/depth/<image stem>.png, 16-bit millimetres, 0 = none
+    #[arg(long)]
+    pub(crate) depth: bool,
+    /// Worker threads; 0 means one per core
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) threads: usize,
+    /// Folder for the pictures
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+}
+
+#[derive(Args)]
+pub(crate) struct InfoArgs {
+    /// Gaussians or a point cloud, PLY
+    pub(crate) file: PathBuf,
+}
+
+#[derive(Args)]
+pub(crate) struct EvalArgs {
+    /// Scenes, as for `reconstruct`; several make a table with their mean
+    #[arg(required = true)]
+    pub(crate) scenes: Vec<PathBuf>,
+    /// JSON of {"KEY": {"input": [views], "test": [views]}}; a name that is not found here is looked up in each
+    /// scene's folder
+    #[arg(long, value_name = "FILE", default_value = "split.json")]
+    pub(crate) split: PathBuf,
+    /// This key of the split only
+    #[arg(long, value_name = "KEY")]
+    pub(crate) only: Option<String>,
+    #[command(flatten)]
+    pub(crate) method: MethodArgs,
+    #[command(flatten)]
+    pub(crate) frame: FrameArgs,
+    #[command(flatten)]
+    pub(crate) depth: DepthArgs,
+    /// Time the reconstruction R times and report the median
+    #[arg(long, value_name = "R", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) repeat: u32,
+    /// Write the numbers, per view too
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+}
+
+#[derive(Args)]
+pub(crate) struct DemoArgs {
+    /// Folder for what the demo makes
+    #[arg(default_value = "vg-demo")]
+    pub(crate) folder: PathBuf,
+    /// Worker threads; 0 means one per core
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) threads: usize,
+}
+
+#[derive(Args)]
+pub(crate) struct AlignArgs {
+    /// The scene, usually a COLMAP folder
+    pub(crate) scene: PathBuf,
+    /// Camera centres in the vehicle's frame, metres: {"000.jpg": [x, y, z], ...}, at least three
+    #[arg(long, value_name = "CENTERS.json")]
+    pub(crate) known_centers: PathBuf,
+    /// The similarity, for --vehicle-from-world
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: PathBuf,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Prior {
+    Auto,
+    Given,
+    Hull,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Symmetry {
+    Auto,
+    Always,
+    Never,
+}
+
+/// The fields of [`Keep`].
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum KeepItem {
+    DuplicateViews,
+    Overlap,
+    SilhouetteEdge,
+    Floaters,
+    ShBands,
+    All,
+}
+
+/// Length, width, height in metres. A type of its own: the parser would take an array for a list of values.
+#[derive(Clone, Copy)]
+struct VehicleSize([f64; 3]);
+
+fn vehicle_size(text: &str) -> Result<VehicleSize, String> {
+    let size = numbers::<f64>(text).ok_or("expected three numbers, length,width,height in metres")?;
+    match (Options { vehicle_size: Some(size), ..Options::default() }).validate() {
+        Ok(()) => Ok(VehicleSize(size)),
+        Err(vg::Error::Argument { allowed, .. }) => Err(format!("expected {allowed}")),
+        Err(other) => Err(other.to_string()),
+    }
+}
+
+fn background(text: &str) -> Result<Background, String> {
+    match text {
+        "white" => Ok(Background::Color([1.0; 3])),
+        "black" => Ok(Background::Color([0.0; 3])),
+        "transparent" => Ok(Background::Transparent),
+        other => numbers::<u8>(other)
+            .map(|rgb| Background::Color(rgb.map(|c| f32::from(c) / 255.0)))
+            .ok_or_else(|| "expected white, black, transparent, or R,G,B with numbers from 0 to 255".into()),
+    }
+}
+
+/// Three numbers with commas between.
+fn numbers<T: std::str::FromStr>(text: &str) -> Option<[T; 3]> {
+    let numbers: Vec<T> = text.split(',').map(|part| part.trim().parse()).collect::<Result<_, _>>().ok()?;
+    numbers.try_into().ok()
+}
+
+fn picture_size(text: &str) -> Result<(u32, u32), String> {
+    let side =
+        |text: &str| text.parse().ok().filter(|side| (1..=vg::geometry::camera::MAX_SIDE).contains(side));
+    text.split_once('x')
+        .and_then(|(w, h)| Some((side(w)?, side(h)?)))
+        .ok_or_else(|| format!("expected WxH, each 1 to {}", vg::geometry::camera::MAX_SIDE))
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|value: &f64| *value > 0.0 && value.is_finite())
+        .ok_or_else(|| "expected a number above 0".into())
+}

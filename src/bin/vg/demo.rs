@@ -1,0 +1,104 @@
+//! `vg demo`: the whole job on the sample inside the program, with pictures to look at.
+
+use crate::args::DemoArgs;
+use crate::contact::{self, Tile};
+use crate::eval::measure::{self, Measured};
+use crate::eval::split;
+use crate::job::{Failure, Outcome, Result};
+use crate::{files, reconstruct, render, sample, scene, shown};
+use std::path::Path;
+use vg::View;
+use vg::io::{SceneOptions, ply};
+use vg::pipeline::{Options, PriorChoice};
+use vg::render::{RenderOptions, Rendered};
+
+/// Four photographs of the right side in; the model, its left side and the errors there out.
+pub(crate) fn run(args: &DemoArgs) -> Result {
+    let folder = &args.folder;
+    files::prepare_folder(folder)?;
+    let (scene_folder, unseen) = (folder.join("scene"), folder.join("unseen"));
+    sample::write(&scene_folder)?;
+    files::prepare_folder(&unseen)?;
+
+    let splits = split::read(&scene_folder.join("split.json"), None)?;
+    let split = splits.into_values().next().ok_or_else(|| Failure::job("the sample has no split"))?;
+    // Photographs, masks and cameras are all this gets; the sample's depth is for the comparison below.
+    let without_depth = SceneOptions { load_depth: false, ..SceneOptions::default() };
+    let hull =
+        Options { prior: PriorChoice::Hull, threads: args.threads, points: true, ..Options::default() };
+    let inputs = scene::open(&scene_folder, &split.input, &without_depth)?;
+    let made = reconstruct::reconstruct(&inputs.scene, &hull)?;
+
+    let tests = scene::open(&scene_folder, &split.test, &without_depth)?;
+    let (drawn, measured) = measure::judge(&made, &tests.scene.views, args.threads)?;
+    ply::write(&folder.join("asset.ply"), &made.gaussians)?;
+    if let Some(cloud) = &made.points {
+        ply::write_points(&folder.join("points.ply"), &cloud.positions, &cloud.colors)?;
+    }
+    files::write_json(&folder.join("report.json"), &made.report)?;
+    let white = RenderOptions::default().background;
+    for (view, picture) in tests.scene.views.iter().zip(&drawn) {
+        render::write(&unseen.join(render::picture_name(&view.name)), picture, white)?;
+    }
+    let rows = [
+        inputs.scene.views.iter().map(photograph).collect(),
+        drawn.iter().map(rendered).collect(),
+        tests.scene.views.iter().map(photograph).collect::<Vec<_>>(),
+    ];
+    contact::write(&folder.join("contact.png"), &rows)?;
+
+    let given = Options { prior: PriorChoice::Given, ..hull.clone() };
+    let bound = measure::split(&scene_folder, &split, &without_depth, &given, 1)?;
+    Ok(Outcome::done(text(folder, &split, &measured, &bound)))
+}
+
+/// The masked photograph on white.
+fn photograph(view: &View) -> Tile {
+    let pixels = vg::metrics::on_white(view).iter().map(|c| c.map(|v| (v * 255.0).round() as u8)).collect();
+    Tile { size: (view.camera.width, view.camera.height), pixels }
+}
+
+fn rendered(picture: &Rendered) -> Tile {
+    Tile { size: (picture.width, picture.height), pixels: picture.to_rgb8() }
+}
+
+/// The main figures, and where to look.
+fn text(folder: &Path, split: &split::Split, hull: &Measured, given: &Measured) -> String {
+    let row = |name: &str, m: &Measured| {
+        format!(
+            "  {name:<30} {:>7.2} {:>6.3} {:>6.3} {:>9.2} {:>10.1} {:>10}",
+            m.errors.psnr_db,
+            m.errors.ssim.unwrap_or(f64::NAN),
+            m.errors.silhouette_iou,
+            m.reconstruct_ms / 1e3,
+            m.render_ms,
+            shown::count(m.gaussians as usize),
+        )
+    };
+    let written = [
+        ("contact.png", "inputs; the unseen side as rendered; the same as photographed"),
+        ("unseen", "the renders in full size"),
+        ("asset.ply", "the model, for any viewer of 3D Gaussians"),
+        ("points.ply", "the metric coloured point cloud of the inputs"),
+        ("report.json", "stage times, counts, what was left out and why"),
+        ("scene", "the sample itself, to try the other commands on"),
+    ];
+    let files = written.map(|(name, what)| format!("  {:<12} {what}", name));
+    [
+        format!(
+            "{} photographs of the right side in; errors in {} photographs of the left side:",
+            split.input.len(),
+            split.test.len()
+        ),
+        format!(
+            "  {:<30} {:>7} {:>6} {:>6} {:>9} {:>10} {:>10}",
+            "depth from", "PSNR dB", "SSIM", "IoU", "time s", "ms/picture", "Gaussians"
+        ),
+        row("silhouettes (--prior hull)", hull),
+        row("the scene (--prior given)", given),
+        "The second row is a bound: it is given the true depth of the inputs. Of the first row there are now,".into(),
+        format!("in {}:", folder.display()),
+        files.join("\n"),
+    ]
+    .join("\n")
+}

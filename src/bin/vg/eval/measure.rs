@@ -1,0 +1,163 @@
+//! One split of one scene: reconstruct from its inputs, measure in its test views (method section 7).
+//!
+//! The photograph is composited on white with its mask, the render is drawn on white with its own alpha, and the
+//! full frames are compared. A distorted camera's photograph stays on its own grid; the renderer follows it there.
+
+use super::split::Split;
+use crate::job::Result;
+use crate::{reconstruct, scene};
+use serde::Serialize;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Instant;
+use vg::io::SceneOptions;
+use vg::metrics::ViewErrors;
+use vg::pipeline::{Options, PriorChoice, Reconstruction};
+use vg::progress::Context;
+use vg::render::{CpuRenderer, RenderOptions, Rendered, Renderer};
+use vg::{Error, Gaussians, View};
+
+/// The numbers of one split.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Measured {
+    /// The depth source that was used.
+    pub(crate) prior: String,
+    /// Means over the test views.
+    #[serde(flatten)]
+    pub(crate) errors: ViewErrors,
+    /// Depth error in the input views, metres, where they have depth that the method was not shown.
+    pub(crate) input_depth_mae_m: Option<f64>,
+    /// Median over the repeats, milliseconds.
+    pub(crate) reconstruct_ms: f64,
+    /// Median over the test views, milliseconds.
+    pub(crate) render_ms: f64,
+    /// In the model.
+    pub(crate) gaussians: f64,
+    /// Each test view.
+    pub(crate) views: Vec<MeasuredView>,
+}
+
+/// One test view.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct MeasuredView {
+    /// The view.
+    pub(crate) name: String,
+    /// Its numbers.
+    #[serde(flatten)]
+    pub(crate) errors: ViewErrors,
+}
+
+/// Reconstructs `repeat` times and measures once.
+pub(crate) fn split(
+    path: &Path,
+    split: &Split,
+    options: &SceneOptions,
+    method: &Options,
+    repeat: u32,
+) -> Result<Measured> {
+    let shown = inputs(path, split, options, method)?;
+    let made = reconstruct::reconstruct(&shown, method)?;
+    let mut times = vec![made.report.total_ms];
+    for _ in 1..repeat {
+        times.push(reconstruct::reconstruct(&shown, method)?.report.total_ms);
+    }
+    drop(shown);
+    // Depth of the test views is for the measure only.
+    let with_depth = SceneOptions { load_depth: true, ..options.clone() };
+    let judged = scene::open(path, &split.test, &with_depth)?;
+    let (_, mut measured) = judge(&made, &judged.scene.views, method.threads)?;
+    measured.reconstruct_ms = median(&mut times);
+    if made.report.prior != "given" {
+        // Opened again with depth, for this measure only: the prior has done its work without.
+        let judged = scene::open(path, &split.input, &with_depth)?;
+        let drawn = drawn(&made.gaussians, &judged.scene.views, method.threads)?.0;
+        let errors: Vec<_> =
+            drawn.iter().zip(&judged.scene.views).map(|(d, v)| ViewErrors::of(d, v)).collect();
+        measured.input_depth_mae_m = ViewErrors::mean(&errors).and_then(|mean| mean.depth_mae_m);
+    }
+    Ok(measured)
+}
+
+/// The views the method sees, with depth only where it is to use it.
+fn inputs(path: &Path, split: &Split, options: &SceneOptions, method: &Options) -> Result<vg::Scene> {
+    let load_depth = method.prior != PriorChoice::Hull;
+    let mut shown = scene::open(path, &split.input, &SceneOptions { load_depth, ..options.clone() })?.scene;
+    if method.prior == PriorChoice::Auto && shown.views.iter().any(|v| v.depth.is_none()) {
+        shown.views.iter_mut().for_each(|view| view.depth = None);
+    }
+    Ok(shown)
+}
+
+/// The model drawn into these views, and how far that is from their photographs.
+pub(crate) fn judge(
+    made: &Reconstruction,
+    views: &[View],
+    threads: usize,
+) -> Result<(Vec<Rendered>, Measured)> {
+    let (drawn, render_ms) = drawn(&made.gaussians, views, threads)?;
+    let each: Vec<ViewErrors> = drawn.iter().zip(views).map(|(d, v)| ViewErrors::of(d, v)).collect();
+    let none = || Error::argument("test", "no view", "at least one");
+    let measured = Measured {
+        prior: made.report.prior.to_owned(),
+        errors: ViewErrors::mean(&each).ok_or_else(none)?,
+        input_depth_mae_m: None,
+        reconstruct_ms: made.report.total_ms,
+        render_ms,
+        gaussians: made.gaussians.len() as f64,
+        views: views
+            .iter()
+            .zip(each)
+            .map(|(v, errors)| MeasuredView { name: v.name.clone(), errors })
+            .collect(),
+    };
+    Ok((drawn, measured))
+}
+
+/// The model as these views' cameras see it, on white, and the median time of one picture, milliseconds.
+fn drawn(gaussians: &Gaussians, views: &[View], threads: usize) -> Result<(Vec<Rendered>, f64)> {
+    let mut silent = |_| ControlFlow::Continue(());
+    let context = Context::new(threads, &mut silent)?;
+    let (renderer, options) = (CpuRenderer::new(), RenderOptions::default());
+    // The first picture also pays for memory that later ones reuse.
+    if let Some(first) = views.first() {
+        context.parallel(|| renderer.render(gaussians, &first.camera, &options))?;
+    }
+    let mut times = Vec::with_capacity(views.len());
+    let mut pictures = Vec::with_capacity(views.len());
+    for view in views {
+        let start = Instant::now();
+        pictures.push(context.parallel(|| renderer.render(gaussians, &view.camera, &options))?);
+        times.push(start.elapsed().as_secs_f64() * 1e3);
+    }
+    Ok((pictures, median(&mut times)))
+}
+
+/// Of an even number of values the mean of the middle two; of none 0.
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    match values.len() {
+        0 => 0.0,
+        n => 0.5 * (values[(n - 1) / 2] + values[n / 2]),
+    }
+}
+
+/// Means over several splits; `None` of nothing.
+pub(crate) fn mean(all: &[&Measured]) -> Option<Measured> {
+    let errors: Vec<ViewErrors> = all.iter().map(|m| m.errors).collect();
+    let errors = ViewErrors::mean(&errors)?;
+    let mean = |values: Vec<f64>| {
+        let n = values.len();
+        (n > 0).then(|| values.iter().sum::<f64>() / n as f64)
+    };
+    let of = |get: fn(&Measured) -> f64| mean(all.iter().map(|m| get(m)).collect());
+    let same_prior = all.iter().all(|m| m.prior == all[0].prior);
+    Some(Measured {
+        prior: if same_prior { all[0].prior.clone() } else { "mixed".into() },
+        errors,
+        input_depth_mae_m: mean(all.iter().filter_map(|m| m.input_depth_mae_m).collect()),
+        reconstruct_ms: of(|m| m.reconstruct_ms)?,
+        render_ms: of(|m| m.render_ms)?,
+        gaussians: of(|m| m.gaussians)?.round(),
+        views: Vec::new(),
+    })
+}

@@ -1,0 +1,107 @@
+//! `vg info`: what is in a PLY file, and what looks wrong with it.
+
+use crate::args::InfoArgs;
+use crate::job::{Outcome, Result};
+use crate::shown;
+use std::fmt::Write;
+use vg::io::ply;
+use vg::io::ply::PlyNotes;
+use vg::render::options::ALPHA_THRESHOLD;
+use vg::{Error, Gaussians};
+
+/// Longest side that a vehicle may have, metres, as `--box` accepts it.
+const LARGEST_M: f32 = 30.0;
+
+/// Shortest length of a vehicle, metres.
+const SMALLEST_M: f32 = 0.1;
+
+/// The largest standard deviation a reconstruction makes, metres.
+const LARGEST_SCALE_M: f32 = 3.0;
+
+/// Gaussians, or else coloured points.
+pub(crate) fn run(args: &InfoArgs) -> Result {
+    match ply::read(&args.file) {
+        Ok((gaussians, notes)) => Ok(Outcome::done(of_gaussians(&gaussians, &notes))),
+        // A PLY file without the properties of Gaussians may be a point cloud.
+        Err(Error::Format { path, field, reason }) if field.starts_with("property ") => {
+            match ply::read_points(&args.file) {
+                Ok((positions, _)) => Ok(Outcome::done(of_points(&positions))),
+                Err(_) => Err(Error::Format { path, field, reason }.into()),
+            }
+        }
+        Err(other) => Err(other.into()),
+    }
+}
+
+fn of_gaussians(gaussians: &Gaussians, notes: &PlyNotes) -> String {
+    let mut text = format!("Gaussians: {}\n", shown::count(gaussians.len()));
+    let _ = writeln!(text, "SH degree: {}", gaussians.sh_degree());
+    text += &extent(gaussians.bounds());
+    if !gaussians.is_empty() {
+        let mut scales: Vec<f32> = gaussians.scales().as_flattened().to_vec();
+        scales.sort_by(f32::total_cmp);
+        let mm = |part: f64| scales[((scales.len() - 1) as f64 * part) as usize] * 1e3;
+        let _ = writeln!(text, "scales: {:.3} to {:.3} mm, median {:.3} mm", mm(0.0), mm(1.0), mm(0.5));
+        let mean = gaussians.opacities().iter().map(|&o| f64::from(o)).sum::<f64>() / gaussians.len() as f64;
+        let _ = writeln!(text, "mean opacity: {mean:.3}");
+    }
+    text + &listed(&problems(gaussians, notes))
+}
+
+fn of_points(positions: &[[f32; 3]]) -> String {
+    let bounds = positions.iter().fold(None, |bounds: Option<([f32; 3], [f32; 3])>, p| {
+        let (low, high) = bounds.unwrap_or((*p, *p));
+        Some((std::array::from_fn(|k| low[k].min(p[k])), std::array::from_fn(|k| high[k].max(p[k]))))
+    });
+    let mut problems = Vec::new();
+    problems.extend(implausible_size(bounds.as_ref(), positions.is_empty()));
+    format!("points: {}\n", shown::count(positions.len())) + &extent(bounds) + &listed(&problems)
+}
+
+fn extent(bounds: Option<([f32; 3], [f32; 3])>) -> String {
+    bounds.map_or_else(String::new, |bounds| {
+        let (low, high) = bounds;
+        let axis = |name: char, k: usize| format!("{name} {:.3} to {:.3}", low[k], high[k]);
+        let axes = [axis('x', 0), axis('y', 1), axis('z', 2)].join(", ");
+        format!("extent: {} ({axes})\n", shown::extent(&bounds))
+    })
+}
+
+fn listed(problems: &[String]) -> String {
+    match problems {
+        [] => "problems: none".into(),
+        found => format!("problems:\n  {}", found.join("\n  ")),
+    }
+}
+
+fn problems(gaussians: &Gaussians, notes: &PlyNotes) -> Vec<String> {
+    let mut found = Vec::new();
+    if !notes.ignored.is_empty() {
+        found.push(format!("properties that Gaussians do not have, ignored: {}", notes.ignored.join(", ")));
+    }
+    if notes.clamped_scales > 0 {
+        found.push(format!("{} scales too small for a float, raised", shown::count(notes.clamped_scales)));
+    }
+    found.extend(implausible_size(gaussians.bounds().as_ref(), gaussians.is_empty()));
+    let count = |test: &dyn Fn(usize) -> bool| (0..gaussians.len()).filter(|&i| test(i)).count();
+    let invisible = count(&|i| gaussians.opacities()[i] < ALPHA_THRESHOLD);
+    if invisible > 0 {
+        found.push(format!("{} Gaussians are never drawn: opacity below 1/255", shown::count(invisible)));
+    }
+    let huge = count(&|i| gaussians.scales()[i].iter().any(|&s| s > LARGEST_SCALE_M));
+    if huge > 0 {
+        found.push(format!("{} Gaussians are larger than {LARGEST_SCALE_M} m", shown::count(huge)));
+    }
+    found
+}
+
+fn implausible_size(bounds: Option<&([f32; 3], [f32; 3])>, is_empty: bool) -> Option<String> {
+    if is_empty {
+        return Some("it is empty".into());
+    }
+    let (low, high) = bounds?;
+    let longest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f32::max);
+    (!(SMALLEST_M..=LARGEST_M).contains(&longest)).then(|| {
+        format!("the longest side is {longest} m; a vehicle has {SMALLEST_M} to {LARGEST_M} m: is the unit a metre?")
+    })
+}

@@ -1,0 +1,73 @@
+//! What a command leaves behind: text to print, or a failure with its exit code.
+
+use std::io::Write;
+
+/// Exit code of a job that failed: bad data, or a file that cannot be read or written.
+pub(crate) const FAILED: u8 = 1;
+
+/// Exit code of arguments that make no sense.
+pub(crate) const USAGE: u8 = 2;
+
+/// What a command that ran to its end says.
+pub(crate) struct Outcome {
+    /// For standard output.
+    pub(crate) text: String,
+    /// `false` if a part of the job failed, which has been said already.
+    pub(crate) complete: bool,
+}
+
+impl Outcome {
+    /// Everything went well.
+    pub(crate) fn done(text: impl Into<String>) -> Self {
+        Self { text: text.into(), complete: true }
+    }
+}
+
+/// Why a command did not do its job.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    /// The cause.
+    pub(crate) message: String,
+    /// Exit code.
+    pub(crate) code: u8,
+}
+
+/// What a command returns.
+pub(crate) type Result<T = Outcome> = std::result::Result<T, Failure>;
+
+impl Failure {
+    /// The data or the file system is at fault.
+    pub(crate) fn job(message: impl Into<String>) -> Self {
+        Self { message: message.into(), code: FAILED }
+    }
+}
+
+impl From<vg::Error> for Failure {
+    fn from(error: vg::Error) -> Self {
+        Self::job(error.to_string())
+    }
+}
+
+/// One line on standard error: `vg: <what>: <message>`.
+pub(crate) fn complain(what: &str, message: &str) {
+    // File names may hold line breaks and terminal commands.
+    let line: String = message
+        .chars()
+        .flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] })
+        .collect();
+    // Nobody is left to tell if this fails.
+    let _ = writeln!(std::io::stderr(), "vg: {what}: {line}");
+}
+
+/// Writes the outcome's text to standard output. A reader that has gone away (`vg info x | head -1`) has what it
+/// wanted.
+pub(crate) fn print(outcome: &Outcome) -> Result<Outcome> {
+    let mut out = std::io::stdout().lock();
+    let written = if outcome.text.is_empty() { Ok(()) } else { writeln!(out, "{}", outcome.text) };
+    match written.and_then(|()| out.flush()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Failure::job(format!("standard output: {e}")))
+        }
+        _ => Ok(Outcome { text: String::new(), complete: outcome.complete }),
+    }
+}

@@ -1,0 +1,59 @@
+//! `vg reconstruct`: a scene in, a model out.
+
+use crate::args::{Prior, ReconstructArgs};
+use crate::job::{Outcome, Result};
+use crate::shown::Bar;
+use crate::{files, scene, shown};
+use vg::io::ply;
+use vg::pipeline::{self, Options, Reconstruction};
+use vg::{Scene, io};
+
+/// Opens, reconstructs, writes.
+pub(crate) fn run(args: &ReconstructArgs) -> Result {
+    let outputs: Vec<_> = [Some(&args.output), args.points.as_ref(), args.report.as_ref()]
+        .into_iter()
+        .flatten()
+        .cloned()
+        .collect();
+    // Depth that will not be used is not read either.
+    let load_depth = args.method.prior != Prior::Hull;
+    let options = scene::options(&args.frame, args.depth.depth_scale, load_depth)?;
+    let index = io::list_scene(&args.scene, &scene::named(args.views.views.as_deref(), &options))?;
+    files::refuse_clashes(&outputs, &scene::files_of(&index))?;
+    outputs.iter().try_for_each(|path| files::prepare(path))?;
+
+    let opened = scene::load(index)?;
+    let settings = Options { points: args.points.is_some(), ..args.method.options() };
+    let made = reconstruct(&opened.scene, &settings)?;
+
+    ply::write(&args.output, &made.gaussians)?;
+    if let (Some(path), Some(cloud)) = (&args.points, &made.points) {
+        ply::write_points(path, &cloud.positions, &cloud.colors)?;
+    }
+    if let Some(path) = &args.report {
+        files::write_json(path, &made.report)?;
+    }
+    Ok(Outcome::done(format!("{}: {}", args.output.display(), summary(&made))))
+}
+
+/// With progress on a terminal.
+pub(crate) fn reconstruct(scene: &Scene, options: &Options) -> Result<Reconstruction> {
+    let bar = Bar::of_reconstruction();
+    Ok(pipeline::reconstruct(scene, options, &mut |progress| bar.show(progress))?)
+}
+
+/// One line.
+pub(crate) fn summary(made: &Reconstruction) -> String {
+    let report = &made.report;
+    let extent = report.extent_m.as_ref().map_or_else(String::new, |e| format!("{}, ", shown::extent(e)));
+    format!(
+        "{} Gaussians, {extent}SH degree {}, prior {}, {} views, {:.2} s; on these views PSNR {:.2} dB, silhouette IoU {:.3}",
+        shown::count(report.gaussians),
+        report.sh_degree,
+        report.prior,
+        report.views_used.len(),
+        report.total_ms / 1e3,
+        report.input_error.psnr_db,
+        report.input_error.silhouette_iou,
+    )
+}

@@ -1,0 +1,112 @@
+//! `vg render`: a model as a scene's cameras see it, or from all around.
+
+use crate::args::RenderArgs;
+use crate::job::{Failure, Outcome, Result, complain};
+use crate::shown::Bar;
+use crate::{files, scene};
+use glam::{DMat3, DVec3};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use vg::geometry::Intrinsics;
+use vg::io::{self, NamedCamera, image, ply};
+use vg::progress::Context;
+use vg::render::{Background, CpuRenderer, RenderOptions, Rendered, Renderer};
+use vg::{Camera, Gaussians, Pose};
+
+/// The turntable's camera looks down on the vehicle by this much, radians (12 degrees).
+const ELEVATION: f64 = 0.21;
+
+/// Its vertical field of view, radians (35 degrees): that of a lens for portraits.
+const FIELD_OF_VIEW: f64 = 0.61;
+
+/// Reads the model, draws it into every camera.
+pub(crate) fn run(args: &RenderArgs) -> Result {
+    let (gaussians, _) = ply::read(&args.asset)?;
+    let mut inputs = vec![args.asset.clone()];
+    let cameras = match (&args.cameras, args.turntable) {
+        (Some(path), _) => {
+            // The cameras alone: neither pictures nor depth need exist.
+            let options = scene::options(&args.frame, None, true)?;
+            let index = io::list_scene(path, &scene::named(args.views.views.as_deref(), &options))?;
+            inputs.extend(scene::files_of(&index));
+            index.cameras()
+        }
+        (None, n) => turntable(&gaussians, n.unwrap_or(1), args.size)?,
+    };
+    let pictures: Vec<PathBuf> = cameras.iter().map(|c| args.output.join(picture_name(&c.name))).collect();
+    let depth_folder = args.output.join("depth");
+    let depths: Vec<PathBuf> = match args.depth {
+        true => cameras.iter().map(|c| depth_folder.join(picture_name(&c.name))).collect(),
+        false => Vec::new(),
+    };
+    files::refuse_clashes(&[pictures.as_slice(), &depths].concat(), &inputs)?;
+    files::prepare_folder(if args.depth { &depth_folder } else { &args.output })?;
+
+    let options = RenderOptions { background: args.background, ..RenderOptions::default() };
+    let mut silent = |_| ControlFlow::Continue(());
+    let context = Context::new(args.threads, &mut silent)?;
+    let renderer = CpuRenderer::new();
+    let bar = Bar::of_pictures(cameras.len());
+    for (i, named) in cameras.iter().enumerate() {
+        let drawn = context.parallel(|| renderer.render(&gaussians, &named.camera, &options))?;
+        write(&pictures[i], &drawn, options.background)?;
+        if args.depth {
+            let beyond = image::write_depth16(&depths[i], drawn.width, drawn.height, &drawn.depth)?;
+            if beyond > 0 {
+                let path = depths[i].display();
+                complain("warning", &format!("{path}: {beyond} pixels lie beyond 65.535 m and hold none"));
+            }
+        }
+        bar.advance();
+    }
+    drop(bar);
+    Ok(Outcome::done(format!("{}: {} pictures", args.output.display(), cameras.len())))
+}
+
+/// An opaque picture, or one with its own alpha on a transparent background.
+pub(crate) fn write(path: &Path, drawn: &Rendered, background: Background) -> Result<()> {
+    match background {
+        Background::Color(_) => image::write_rgb8(path, drawn.width, drawn.height, &drawn.to_rgb8())?,
+        Background::Transparent => image::write_rgba8(path, drawn.width, drawn.height, &drawn.to_rgba8())?,
+    }
+    Ok(())
+}
+
+/// `<image stem>.png`, without the folders of the picture's name.
+pub(crate) fn picture_name(name: &str) -> String {
+    let stem = Path::new(name).file_stem().unwrap_or(name.as_ref());
+    format!("{}.png", stem.to_string_lossy())
+}
+
+/// `n` cameras on a circle around the middle of the model, all of it in their pictures, the first in front.
+fn turntable(gaussians: &Gaussians, n: u32, (width, height): (u32, u32)) -> Result<Vec<NamedCamera>> {
+    let (low, high) =
+        gaussians.bounds().ok_or_else(|| Failure::job("the model has no Gaussians to walk around"))?;
+    let (low, high) = (low.map(f64::from), high.map(f64::from));
+    let center = 0.5 * (DVec3::from(low) + DVec3::from(high));
+    let half = 0.5 * (DVec3::from(high) - DVec3::from(low));
+    // The cylinder around the model fits between the picture's borders from every side.
+    let radius = half.x.hypot(half.y).max(1e-3);
+    let focal = 0.5 * f64::from(height) / (0.5 * FIELD_OF_VIEW).tan();
+    let tangent = |side: u32| 0.5 * f64::from(side) / focal;
+    let for_width = radius / tangent(width).atan().sin();
+    let for_height = (half.z * ELEVATION.cos() + radius * ELEVATION.sin()) / tangent(height) + radius;
+    let distance = for_width.max(for_height);
+    let intrinsics =
+        Intrinsics { fx: focal, fy: focal, cx: 0.5 * f64::from(width), cy: 0.5 * f64::from(height) };
+    let digits = (n - 1).to_string().len().max(3);
+    (0..n)
+        .map(|i| {
+            let azimuth = std::f64::consts::TAU * f64::from(i) / f64::from(n);
+            let outwards =
+                DVec3::new(azimuth.cos() * ELEVATION.cos(), azimuth.sin() * ELEVATION.cos(), ELEVATION.sin());
+            let right = outwards.cross(DVec3::Z).normalize() * -1.0;
+            let forward = -outwards;
+            let down = forward.cross(right);
+            let pose =
+                Pose::new("turntable", DMat3::from_cols(right, down, forward), center + distance * outwards)?;
+            let camera = Camera::pinhole(width, height, intrinsics, pose)?;
+            Ok(NamedCamera { name: format!("{i:0digits$}.png"), camera })
+        })
+        .collect()
+}

@@ -1,0 +1,39 @@
+//! Opens scenes as the command line describes them.
+
+use crate::args::FrameArgs;
+use crate::job::{Result, complain};
+use std::path::{Path, PathBuf};
+use vg::io::{SceneFiles, SceneIndex, SceneOptions};
+
+/// The scene's options without names of views.
+pub(crate) fn options(frame: &FrameArgs, depth_scale: Option<f64>, load_depth: bool) -> Result<SceneOptions> {
+    let read = |path: &PathBuf| vg::io::read_vehicle_from_world(path);
+    let vehicle_from_world = frame.vehicle_from_world.as_ref().map(read).transpose()?;
+    Ok(SceneOptions { views: None, vehicle_from_world, depth_scale, load_depth })
+}
+
+/// Reads the views of these names.
+pub(crate) fn open(path: &Path, views: &[String], options: &SceneOptions) -> Result<SceneFiles> {
+    load(vg::io::list_scene(path, &named(Some(views), options))?)
+}
+
+/// These options with these views.
+pub(crate) fn named(views: Option<&[String]>, options: &SceneOptions) -> SceneOptions {
+    SceneOptions { views: views.map(<[String]>::to_vec), ..options.clone() }
+}
+
+/// The files a scene's views consist of, which no result may replace.
+pub(crate) fn files_of(index: &SceneIndex) -> Vec<PathBuf> {
+    let views = index.views.iter().flat_map(|view| {
+        let depth = view.depth.as_ref().map(|d| d.path.clone());
+        [Some(view.image.clone()), view.mask.clone(), depth].into_iter().flatten()
+    });
+    views.chain([index.source.clone()]).collect()
+}
+
+/// Reads the pixels of listed views, and says what looks like a mistake.
+pub(crate) fn load(index: SceneIndex) -> Result<SceneFiles> {
+    let files = index.load()?;
+    files.notes.iter().for_each(|note| complain("warning", note));
+    Ok(files)
+}

@@ -1,0 +1,75 @@
+//! Progress on a terminal, and numbers as people read them.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::ops::ControlFlow;
+use std::time::Duration;
+use vg::progress::Progress;
+
+/// Steps of the bar per stage.
+const STEPS: u64 = 100;
+
+/// The stages in order, as a reconstruction reports them.
+const STAGES: [&str; 7] = ["plan", "undistort", "prior", "pixels", "head", "symmetry", "check"];
+
+/// A bar on standard error, where that is a terminal; else nothing.
+pub(crate) struct Bar(ProgressBar);
+
+impl Bar {
+    /// Of one reconstruction.
+    pub(crate) fn of_reconstruction() -> Self {
+        Self::with(STAGES.len() as u64 * STEPS, "{wide_bar} {msg:9} {elapsed:>4}")
+    }
+
+    /// Of `n` pictures.
+    pub(crate) fn of_pictures(n: usize) -> Self {
+        Self::with(n as u64, "{wide_bar} {pos}/{len} {elapsed:>4}")
+    }
+
+    fn with(length: u64, template: &str) -> Self {
+        let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Self(bar)
+    }
+
+    /// Where a reconstruction stands.
+    pub(crate) fn show(&self, progress: Progress) -> ControlFlow<()> {
+        self.0.set_message(progress.stage);
+        if let Some(stage) = STAGES.iter().position(|s| *s == progress.stage) {
+            self.0.set_position(stage as u64 * STEPS + (progress.fraction * STEPS as f64) as u64);
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// One more picture.
+    pub(crate) fn advance(&self) {
+        self.0.inc(1);
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
+/// `1 234 567`
+pub(crate) fn count(n: usize) -> String {
+    let digits = n.to_string();
+    let mut out = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push(' ');
+        }
+        out.push(digit);
+    }
+    out
+}
+
+/// `4.63 x 1.89 x 1.45 m`, of the lowest and the highest centre.
+pub(crate) fn extent((low, high): &([f32; 3], [f32; 3])) -> String {
+    let [x, y, z]: [f32; 3] = std::array::from_fn(|k| high[k] - low[k]);
+    format!("{x:.2} x {y:.2} x {z:.2} m")
+}

@@ -1,0 +1,80 @@
+//! `vg eval` on the sample.
+
+use super::*;
+use std::fs;
+
+#[test]
+fn an_evaluation_prints_a_table_and_writes_the_same_numbers_as_json() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = "eval . --split split.json --prior hull --repeat 2 --json {}/e.json";
+    let out = succeed(folder.path(), words).out;
+    let lines: Vec<&str> = out.lines().collect();
+    assert!(lines[0].starts_with("scene") && lines[0].contains("SSIM") && lines.len() == 2, "{out}");
+    let document = json(&folder.path().join("e.json"));
+    let row = &document["splits"][0];
+    assert_eq!((row["scene"].as_str(), row["split"].as_str()), (Some("sedan"), Some("right_to_left")));
+    assert_eq!((row["prior"].as_str(), document["repeat"].as_u64()), (Some("hull"), Some(2)));
+    let psnr = row["psnr_db"].as_f64().unwrap();
+    assert!(lines[1].contains(&format!("{psnr:.3}")), "{out}");
+    // Far below what is reached: this guards the protocol (white background, sides, masks), not the method.
+    assert!(psnr > 17.0 && row["silhouette_iou"].as_f64().unwrap() > 0.85, "{row}");
+    assert!(row["psnr_box_db"].as_f64().unwrap() < psnr);
+    // The hull was not shown the inputs' depth, so it can be measured with it.
+    let depth = row["input_depth_mae_m"].as_f64().unwrap();
+    assert!(depth > 0.001 && depth < 0.3, "{depth}");
+    let views = row["views"].as_array().unwrap();
+    let mean = views.iter().map(|v| v["psnr_db"].as_f64().unwrap()).sum::<f64>() / views.len() as f64;
+    assert!(views.len() == 4 && (mean - psnr).abs() < 1e-9);
+}
+
+#[test]
+fn the_hull_is_not_shown_depth() {
+    // Without depth files the same model comes out.
+    let blind = copy_of_sample(&["images", "masks", "split.json", "transforms.json"]);
+    let path = blind.path().join("transforms.json");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replace("depth_file_path", "no_depth_file_path")).unwrap();
+    let at = blind.path();
+    succeed(at, "eval . --prior hull --json {}/seeing.json");
+    succeed(at, "eval {} --prior hull --json {}/blind.json");
+    let psnr = |name: &str| json(&at.join(name))["splits"][0]["psnr_db"].as_f64().unwrap();
+    assert_eq!(psnr("seeing.json"), psnr("blind.json"));
+    assert!(json(&at.join("blind.json"))["splits"][0]["input_depth_mae_m"].is_null());
+}
+
+#[test]
+fn a_broken_scene_is_named_and_the_others_are_evaluated() {
+    let broken = copy_of_sample(&["split.json"]);
+    fs::create_dir(broken.path().join("images")).unwrap();
+    let run = vg_in(broken.path(), "eval {} . --prior given --json {}/e.json");
+    assert_eq!(run.code, 1);
+    assert_one_error(&run);
+    assert!(run.err.contains(broken.path().to_str().unwrap()), "{run:?}");
+    assert!(run.out.contains("sedan  right_to_left  given"), "{run:?}");
+    let document = json(&broken.path().join("e.json"));
+    assert_eq!(document["errors"].as_array().unwrap().len(), 1);
+    assert_eq!(document["splits"].as_array().unwrap().len(), 1);
+}
+
+#[test]
+fn several_scenes_get_a_row_of_means() {
+    let out = succeed(Path::new("."), "eval . transforms.json --prior given").out;
+    let lines: Vec<&str> = out.lines().collect();
+    assert!(lines.len() == 4 && lines[3].starts_with("mean"), "{out}");
+}
+
+#[test]
+fn splits_that_make_no_sense_are_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("list.json"), "[1]").unwrap();
+    fs::write(at.join("none.json"), "{}").unwrap();
+    fs::write(at.join("empty.json"), r#"{"a": {"input": ["000"], "test": []}}"#).unwrap();
+    fs::write(at.join("unknown.json"), r#"{"a": {"input": ["000"], "test": ["999"]}}"#).unwrap();
+    fail(at, "eval . --split {}/list.json", 1, &["list.json", "expected"]);
+    fail(at, "eval . --split {}/none.json", 1, &["none.json", "no split"]);
+    fail(at, "eval . --split {}/empty.json", 1, &["empty.json", "a: no input or no test view"]);
+    fail(at, "eval . --split {}/unknown.json", 1, &["\"999\"", "000.png"]);
+    fail(at, "eval . --only sideways", 1, &["sideways", "right_to_left"]);
+    fail(at, "eval . --split {}/missing.json", 1, &["missing.json"]);
+}

@@ -1,0 +1,108 @@
+//! `vg reconstruct` on the sample.
+
+use super::*;
+use std::fs;
+
+#[test]
+fn views_are_known_by_path_by_file_name_and_by_stem() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mixed = "images/000.png,001.png,002,images/003.png";
+    succeed(
+        at,
+        &format!("reconstruct transforms.json --views {mixed} --prior hull -o {{}}/new/folder/a.ply"),
+    );
+    assert!(fs::read(at.join("new/folder/a.ply")).unwrap() == fs::read(asset()).unwrap());
+}
+
+#[test]
+fn the_model_is_the_same_bytes_with_one_thread_and_with_two() {
+    let folder = tempfile::tempdir().unwrap();
+    for threads in [1, 2] {
+        let common = format!("reconstruct . --views {INPUTS} --prior hull --threads {threads}");
+        succeed(folder.path(), &format!("{common} -o {{}}/{threads}.ply --points {{}}/{threads}.points.ply"));
+    }
+    let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
+    assert!(read("1.ply") == read("2.ply"));
+    assert!(read("1.points.ply") == read("2.points.ply"));
+}
+
+#[test]
+fn auto_uses_depth_if_every_used_view_has_it_and_the_report_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let prior = |views: &str| {
+        let out = succeed(
+            folder.path(),
+            &format!("reconstruct . --views {views} -o {{}}/a.ply --report {{}}/r.json"),
+        )
+        .out;
+        let report = json(&folder.path().join("r.json"));
+        let prior = report["prior"].as_str().unwrap().to_owned();
+        assert!(out.contains(&format!("prior {prior}")), "{out}");
+        assert_eq!(report["views_used"].as_array().unwrap().len(), views.split(',').count());
+        prior
+    };
+    assert_eq!(prior("000,001"), "given");
+    // 005 has no depth.
+    assert_eq!(prior("000,005"), "hull");
+}
+
+#[test]
+fn a_colmap_folder_with_its_similarity_gives_nearly_the_model_of_the_true_poses() {
+    let scene = copy_of_sample(&["images", "masks", "sparse", "vehicle_from_world.json"]);
+    let at = scene.path();
+    let common = "--prior hull --vehicle-from-world {}/vehicle_from_world.json";
+    succeed(at, &format!("reconstruct {{}} --views {INPUTS} {common} -o {{}}/colmap.ply"));
+    let (colmap, _) = vg::io::ply::read(&at.join("colmap.ply")).unwrap();
+    let (direct, _) = vg::io::ply::read(asset()).unwrap();
+    let (n, expected) = (colmap.len() as f64, direct.len() as f64);
+    assert!((n - expected).abs() < 0.01 * expected, "{n} Gaussians, {expected} with the true poses");
+    // COLMAP's model is written with all digits; the grid of the hull may still fall a hair differently.
+    let (low, high) = (colmap.bounds().unwrap(), direct.bounds().unwrap());
+    for k in 0..3 {
+        assert!((low.0[k] - high.0[k]).abs() < 0.02 && (low.1[k] - high.1[k]).abs() < 0.02);
+    }
+}
+
+#[test]
+fn points_are_the_metric_cloud_of_the_used_views_and_keep_changes_the_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let common = format!("reconstruct . --views {INPUTS} --prior given");
+    succeed(at, &format!("{common} -o {{}}/a.ply --points {{}}/p.ply --report {{}}/r.json"));
+    let (positions, colors) = vg::io::ply::read_points(&at.join("p.ply")).unwrap();
+    assert_eq!(positions.len(), colors.len());
+    let size = json(&sample().join("vehicle.json"))["size_m"].clone();
+    for k in 0..3 {
+        let half = 0.5 * size[k].as_f64().unwrap() as f32;
+        // 16-bit millimetres, and the ground's contact with the tyres.
+        assert!(positions.iter().all(|p| p[k].abs() < half + 0.05), "axis {k}");
+    }
+    succeed(at, &format!("{common} --keep all -o {{}}/all.ply --report {{}}/all.json"));
+    let count = |name: &str| json(&at.join(name))["gaussians"].as_u64().unwrap();
+    assert!(count("all.json") > count("r.json"));
+    assert_eq!(json(&at.join("all.json"))["settings"]["keep"]["overlap"], true);
+}
+
+#[test]
+fn options_reach_the_library() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let options = "--prior hull --symmetry never --box 4.7,1.95,1.5 --sh-degree 0 --threads 1";
+    succeed(at, &format!("reconstruct . --views 000,002 {options} -o {{}}/a.ply --report {{}}/r.json"));
+    let report = json(&at.join("r.json"));
+    assert_eq!(report["symmetry"]["mode"], "never");
+    assert_eq!(report["box"]["source"], "given");
+    assert_eq!((report["sh_degree"].as_u64(), report["threads"].as_u64()), (Some(0), Some(1)));
+}
+
+#[test]
+fn depth_scale_replaces_the_scenes_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeed(at, "reconstruct . --views 001 --symmetry never --prior given -o {}/a.ply");
+    succeed(at, "reconstruct . --views 001 --symmetry never --prior given --depth-scale 0.001 -o {}/b.ply");
+    assert!(fs::read(at.join("a.ply")).unwrap() == fs::read(at.join("b.ply")).unwrap());
+    let run = vg_in(at, "reconstruct . --views 001 --prior given --depth-scale 1 -o {}/c.ply");
+    assert!(run.err.contains("warning") && run.err.contains("is the unit right?"), "{run:?}");
+}
