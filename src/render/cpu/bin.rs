@@ -5,7 +5,7 @@
 //! 8192 x 8192 pixels takes many, one after the other. Within a slice the bands are divided among stripes: every
 //! stripe scans the slice once to count and once to fill its own lists, so nothing is shared or merged.
 
-use super::splat::{PixelBounds, Splat};
+use super::splat::PixelBounds;
 use super::tile::{TILE_HEIGHT, TILE_WIDTH};
 use rayon::prelude::*;
 
@@ -101,11 +101,11 @@ impl Stripe {
 }
 
 /// Tile bounds in depth order.
-pub(super) fn tile_bounds(order: &[u32], splats: &[Splat], bounds: &mut Vec<TileBounds>) {
+pub(super) fn tile_bounds(order: &[u32], pixel_bounds: &[PixelBounds], bounds: &mut Vec<TileBounds>) {
     order
         .par_iter()
         .with_min_len(1 << 12)
-        .map(|&i| TileBounds::new(splats[i as usize].bounds))
+        .map(|&i| TileBounds::new(pixel_bounds[i as usize]))
         .collect_into_vec(bounds);
 }
 
@@ -121,8 +121,8 @@ pub(super) fn slice_len(bounds: &[TileBounds]) -> usize {
 
 /// Bins one slice of the depth order; `stripes` is reused from picture to picture.
 pub(super) fn bin(grid: Grid, order: &[u32], bounds: &[TileBounds], stripes: &mut Vec<Stripe>) {
-    // Each stripe scans everything, so no more of them than keep the threads evenly busy.
-    let count = (2 * rayon::current_num_threads()).clamp(1, grid.rows);
+    // Each stripe scans everything, so no more of them than there are threads.
+    let count = rayon::current_num_threads().clamp(1, grid.rows);
     stripes.resize_with(count, Stripe::default);
     stripes.par_iter_mut().enumerate().for_each(|(i, stripe)| {
         let first = i * grid.rows / count;

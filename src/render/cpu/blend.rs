@@ -74,13 +74,17 @@ fn blend_splat<S: Lanes>(simd: S, tile: &mut Tile, origin: [usize; 2], splat: &S
     let first_row = usize::from(b.y0).saturating_sub(top);
     let last_row = (usize::from(b.y1) - top).min(TILE_HEIGHT - 1);
     let columns = (2u32 << (last_column / BLOCK)) - (1u32 << (first_column / BLOCK));
-    let any_live = tile.live[first_row..=last_row].iter().fold(0, |m, l| m | l);
+    let mut any_live = 0;
+    for live in &tile.live[first_row..=last_row] {
+        any_live |= live;
+    }
     if u32::from(any_live) & columns == 0 {
         return;
     }
 
     let footprint = Footprint::new(simd, splat);
-    let color = splat.color.map(|c| simd.splat_f32s(c));
+    let [red, green, blue] = splat.color;
+    let color = [simd.splat_f32s(red), simd.splat_f32s(green), simd.splat_f32s(blue)];
     let depth = simd.splat_f32s(splat.depth);
     let opacity = simd.splat_f32s(splat.opacity);
     let max_alpha = simd.splat_f32s(max_alpha);
@@ -121,7 +125,6 @@ fn pixel_centers(left: usize) -> f32x8 {
 impl Footprint {
     #[inline(always)]
     fn new<S: Lanes>(simd: S, s: &Splat) -> Self {
-        let splat = |v: f32| simd.splat_f32s(v);
         let pivot_x = s.conditional < 0.0;
         let conditional = s.conditional.abs();
         // The same form completed in x, whichever way it was stored; sums of positive terms only.
@@ -140,17 +143,17 @@ impl Footprint {
         let (slope_x, slope_y) = if pivot_x { (-s.slope, 1.0) } else { (1.0, -s.slope) };
         let (along_x, along_y) = if pivot_x { (-s.marginal, 0.0) } else { (0.0, -s.marginal) };
         Self {
-            center: s.center.map(splat),
-            center_rest: s.center_rest.map(splat),
-            conditional: splat(-conditional),
-            along_x: splat(along_x),
-            slope_x: splat(slope_x),
-            slope_y: splat(slope_y),
-            along_y: splat(along_y),
-            inverse_column: splat(inverse_column),
-            row: splat(row),
-            center_slope: splat(center_slope),
-            q_max: splat(s.q_max),
+            center: [simd.splat_f32s(s.center[0]), simd.splat_f32s(s.center[1])],
+            center_rest: [simd.splat_f32s(s.center_rest[0]), simd.splat_f32s(s.center_rest[1])],
+            conditional: simd.splat_f32s(-conditional),
+            along_x: simd.splat_f32s(along_x),
+            slope_x: simd.splat_f32s(slope_x),
+            slope_y: simd.splat_f32s(slope_y),
+            along_y: simd.splat_f32s(along_y),
+            inverse_column: simd.splat_f32s(inverse_column),
+            row: simd.splat_f32s(row),
+            center_slope: simd.splat_f32s(center_slope),
+            q_max: simd.splat_f32s(s.q_max),
         }
     }
 
@@ -168,7 +171,7 @@ impl Footprint {
         let center = simd.add_f32s(center, self.center_rest[0]);
         let center = simd.mul_add_e_f32s(self.center_slope, dy, center);
         // Rounding of the lines above, generously; what it lets in is cut at alpha < 1/255.
-        let magnitude = simd.add_f32s(simd.abs_f32s(center), half);
+        let magnitude = simd.add_f32s(simd.max_f32s(center, simd.sub_f32s(zero, center)), half);
         let slack = simd.mul_add_e_f32s(magnitude, simd.splat_f32s(1e-6), simd.splat_f32s(0.01));
         let half = simd.add_f32s(half, slack);
         let low = simd.sub_f32s(center, half);
@@ -224,13 +227,12 @@ fn composite<S: Lanes>(simd: S, block: &mut Block, alpha: f32x8, color: [f32x8; 
     // A finished pixel's transmittance is negative, so its next one is too.
     let open = simd.greater_than_f32s(next, simd.splat_f32s(TRANSMITTANCE_THRESHOLD));
     let drawn = simd.and_m32s(counts, open);
-    let finished = simd.and_m32s(counts, simd.not_m32s(open));
 
     let weight = simd.select_f32s(drawn, simd.mul_f32s(t, alpha), simd.splat_f32s(0.0));
     for c in 0..3 {
         block.color[c] = simd.mul_add_e_f32s(weight, color[c], block.color[c]);
     }
     block.depth = simd.mul_add_e_f32s(weight, depth, block.depth);
-    let sign = simd.select_f32s(finished, simd.splat_f32s(-0.0), simd.splat_f32s(0.0));
-    block.transmittance = simd.select_f32s(drawn, next, simd.or_f32s(t, sign));
+    let closed = simd.select_f32s(counts, simd.or_f32s(t, simd.splat_f32s(-0.0)), t);
+    block.transmittance = simd.select_f32s(drawn, next, closed);
 }

@@ -21,7 +21,7 @@ use crate::render::{RenderOptions, Rendered, Renderer};
 use bin::{Grid, Stripe, TileBounds};
 use rayon::prelude::*;
 use simd::Lanes;
-use splat::Splat;
+use splat::{PixelBounds, Splat};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tile::{Planes, TILE_HEIGHT, TILE_WIDTH, Tile};
@@ -65,6 +65,7 @@ pub struct StageTimes {
 struct Scratch {
     splats: Vec<Splat>,
     keys: Vec<u32>,
+    pixel_bounds: Vec<PixelBounds>,
     entries: Vec<u64>,
     entries_other: Vec<u64>,
     order: Vec<u32>,
@@ -172,11 +173,15 @@ fn draw<S: Lanes>(
     let sorted = Instant::now();
 
     let grid = Grid::new(camera.width, camera.height);
-    let Scratch { splats, order, bounds, stripes, .. } = scratch;
+    let Scratch { splats, pixel_bounds, order, bounds, stripes, .. } = scratch;
     resize(target, camera.width, camera.height);
-    bin::tile_bounds(order, splats, bounds);
-    let mut times =
-        StageTimes { project: projected - start, sort: sorted - projected, ..StageTimes::default() };
+    bin::tile_bounds(order, pixel_bounds, bounds);
+    let mut times = StageTimes {
+        project: projected - start,
+        sort: sorted - projected,
+        bin: sorted.elapsed(),
+        blend: Duration::ZERO,
+    };
     let mut drawn = 0;
     // Runs once for an empty scene too, to draw the background.
     loop {
@@ -198,14 +203,17 @@ fn draw<S: Lanes>(
 
 fn project_all<S: Lanes>(simd: S, view: &PinholeView, gaussians: &Gaussians, scratch: &mut Scratch) {
     let n = gaussians.len();
-    scratch.splats.resize(n, Splat::default());
-    scratch.keys.resize(n, 0);
-    let chunks = scratch.splats.par_chunks_mut(PROJECT_CHUNK).zip(scratch.keys.par_chunks_mut(PROJECT_CHUNK));
-    chunks.enumerate().for_each(|(i, (splats, keys))| {
+    let Scratch { splats, keys, pixel_bounds, .. } = scratch;
+    splats.resize(n, Splat::default());
+    keys.resize(n, 0);
+    pixel_bounds.resize(n, PixelBounds::default());
+    let chunks = splats.par_chunks_mut(PROJECT_CHUNK).zip(keys.par_chunks_mut(PROJECT_CHUNK));
+    let chunks = chunks.zip(pixel_bounds.par_chunks_mut(PROJECT_CHUNK));
+    chunks.enumerate().for_each(|(i, ((splats, keys), bounds))| {
         let range = i * PROJECT_CHUNK..i * PROJECT_CHUNK + keys.len();
         simd.vectorize(
             #[inline(always)]
-            || project::project(view, gaussians, range, splats, keys),
+            || project::project(view, gaussians, range, splats, keys, bounds),
         );
     });
 }
