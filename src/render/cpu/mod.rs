@@ -18,7 +18,7 @@ use crate::gaussians::Gaussians;
 use crate::geometry::Camera;
 use crate::render::distorted::LensMap;
 use crate::render::{RenderOptions, Rendered, Renderer};
-use bin::{Grid, Stripe, TileBounds};
+use bin::{Grid, Stripe};
 use rayon::prelude::*;
 use simd::Lanes;
 use splat::{PixelBounds, Splat};
@@ -42,6 +42,8 @@ enum Level {
 #[derive(Debug)]
 pub struct CpuRenderer {
     level: Level,
+    /// See [`bin::PAIR_BUDGET`].
+    pair_budget: u64,
     scratch: Mutex<Vec<Scratch>>,
     /// Of the last lens drawn: inverting it takes longer than drawing.
     lens: Mutex<Option<Arc<LensMap>>>,
@@ -69,7 +71,8 @@ struct Scratch {
     entries: Vec<u64>,
     entries_other: Vec<u64>,
     order: Vec<u32>,
-    bounds: Vec<TileBounds>,
+    /// In depth order.
+    bounds: Vec<PixelBounds>,
     stripes: Vec<Stripe>,
 }
 
@@ -95,7 +98,7 @@ impl CpuRenderer {
     }
 
     fn with_level(level: Level) -> Self {
-        Self { level, scratch: Mutex::default(), lens: Mutex::default() }
+        Self { level, pair_budget: bin::PAIR_BUDGET, scratch: Mutex::default(), lens: Mutex::default() }
     }
 
     /// The instructions in use: `"avx2+fma"` or `"portable"`.
@@ -124,8 +127,12 @@ impl CpuRenderer {
         let mut scratch = self.pool().pop().unwrap_or_default();
         let times = match self.level {
             #[cfg(target_arch = "x86_64")]
-            Level::Avx2(simd) => draw(simd, gaussians, camera, options, &mut scratch, target),
-            Level::Portable(simd) => draw(simd, gaussians, camera, options, &mut scratch, target),
+            Level::Avx2(simd) => {
+                draw(simd, gaussians, camera, options, self.pair_budget, &mut scratch, target)
+            }
+            Level::Portable(simd) => {
+                draw(simd, gaussians, camera, options, self.pair_budget, &mut scratch, target)
+            }
         };
         self.pool().push(scratch);
         Ok(times)
@@ -162,6 +169,7 @@ fn draw<S: Lanes>(
     gaussians: &Gaussians,
     camera: &Camera,
     options: &RenderOptions,
+    pair_budget: u64,
     scratch: &mut Scratch,
     target: &mut Rendered,
 ) -> StageTimes {
@@ -175,7 +183,7 @@ fn draw<S: Lanes>(
     let grid = Grid::new(camera.width, camera.height);
     let Scratch { splats, pixel_bounds, order, bounds, stripes, .. } = scratch;
     resize(target, camera.width, camera.height);
-    bin::tile_bounds(order, pixel_bounds, bounds);
+    bin::bounds_in_order(order, pixel_bounds, bounds);
     let mut times = StageTimes {
         project: projected - start,
         sort: sorted - projected,
@@ -187,7 +195,7 @@ fn draw<S: Lanes>(
     loop {
         let begin = Instant::now();
         let first = drawn == 0;
-        let slice = drawn..drawn + bin::slice_len(&bounds[drawn..]);
+        let slice = drawn..drawn + bin::slice_len(&bounds[drawn..], pair_budget);
         drawn = slice.end;
         let last = drawn == order.len();
         bin::bin(grid, &order[slice.clone()], &bounds[slice], stripes);
@@ -272,4 +280,32 @@ fn blend_all<S: Lanes>(
             }
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Pose;
+    use crate::geometry::camera::Intrinsics;
+
+    #[test]
+    fn depth_slices_of_any_size_draw_the_same_bytes() {
+        let n = 400;
+        let at = |i: usize, k: usize| ((i * 7919 + k * 104_729) % 1000) as f32 / 1000.0 - 0.5;
+        let means = (0..n).map(|i| [2.0 * at(i, 0), 2.0 * at(i, 1), 4.0 + at(i, 2)]).collect();
+        let rotations = (0..n).map(|i| [at(i, 3), at(i, 4), at(i, 5), 1.0]).collect();
+        let scales = (0..n).map(|i| [0.3, 0.02, 0.1 + 0.1 * at(i, 6)]).collect();
+        let opacities = (0..n).map(|i| 0.5 + at(i, 7)).collect();
+        let sh = (0..3 * n).map(|i| at(i, 8)).collect();
+        let gaussians = Gaussians::from_arrays(0, means, rotations, scales, opacities, sh).unwrap();
+        let intrinsics = Intrinsics { fx: 150.0, fy: 150.0, cx: 75.0, cy: 50.0 };
+        let camera = Camera::pinhole(150, 100, intrinsics, Pose::IDENTITY).unwrap();
+        let options = RenderOptions::default();
+        let expected = CpuRenderer::new().render(&gaussians, &camera, &options).unwrap();
+        assert!(expected.alpha.iter().any(|&a| a > 0.999));
+        for pair_budget in [1, 10, 100, 1000] {
+            let sliced = CpuRenderer { pair_budget, ..CpuRenderer::new() };
+            assert!(sliced.render(&gaussians, &camera, &options).unwrap() == expected, "{pair_budget} pairs");
+        }
+    }
 }

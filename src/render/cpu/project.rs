@@ -21,7 +21,7 @@ const HALF_LOG2_E: f64 = 0.5 * std::f64::consts::LOG2_E;
 
 const LANES: usize = 8;
 
-/// Projects the Gaussians of `range` into `splats`, `bounds` (a copy that binning scans) and `keys` (bits of z, or [`NOT_DRAWN`]); those that
+/// Projects the Gaussians of `range` into `splats`, `bounds` (the pixels they may touch) and `keys` (bits of z, or [`NOT_DRAWN`]); those that
 /// are not drawn keep an old splat.
 #[inline(always)]
 pub(super) fn project(
@@ -72,7 +72,9 @@ pub(super) fn project(
                 color: color::color(sh, &out.basis[l], coefficients),
                 depth: out.depth[l],
                 q_max: out.q_max[l],
-                bounds: bounds[l],
+                center_slope: out.center_slope[l],
+                inverse_column: out.inverse_column[l],
+                row: out.row[l],
             };
         }
         start += LANES;
@@ -113,6 +115,9 @@ struct Outputs {
     opacity: [f32; LANES],
     depth: [f32; LANES],
     q_max: [f32; LANES],
+    center_slope: [f32; LANES],
+    inverse_column: [f32; LANES],
+    row: [f32; LANES],
     /// x0, x1, y0, y1
     bounds: [[i32; LANES]; 4],
     /// From the camera to the Gaussian, unit.
@@ -212,6 +217,11 @@ fn project_lane(view: &PinholeView, g: &Inputs, out: &mut Outputs, l: usize) {
     out.opacity[l] = opacity;
     out.depth[l] = depth;
     out.q_max[l] = q_max;
+    let inverse_y = 1.0 / variance_y;
+    out.center_slope[l] = (covariance_xy * inverse_y) as f32;
+    // A form wider than f32 holds stays finite: infinity times 0 would lose its rows.
+    out.inverse_column[l] = (determinant * inverse_y * (1.0 / HALF_LOG2_E)).min(1e38) as f32;
+    out.row[l] = (HALF_LOG2_E * inverse_y) as f32;
 
     let inverse_length = 1.0 / dot(d, d).sqrt().max(f64::MIN_POSITIVE);
     for k in 0..3 {
