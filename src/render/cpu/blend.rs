@@ -25,20 +25,27 @@ pub(super) fn blend<S: Lanes>(
     splats: &[Splat],
     max_alpha: f32,
 ) {
-    let mut batch = [(Entry::default(), Splat::default()); BATCH];
+    let mut x = [pixel_centers(origin[0]); BLOCKS];
+    for (at, x) in x.iter_mut().enumerate() {
+        *x = pixel_centers(origin[0] + at * BLOCK);
+    }
+    let mut entries = [Entry::default(); BATCH];
+    let mut batch = [Splat::default(); BATCH];
     for list in list.chunks(BATCH) {
-        if tile.live == [0; TILE_HEIGHT] {
+        if tile.live == [0; TILE_HEIGHT + 8] {
             return;
         }
         let mut count = 0;
         for &entry in list {
-            if is_visible(tile, entry) {
-                batch[count] = (entry, splats[entry.splat()]);
-                count += 1;
-            }
+            entries[count] = entry;
+            count += usize::from(is_visible(tile, entry));
         }
-        for (entry, splat) in &batch[..count] {
-            blend_splat(simd, tile, origin, *entry, splat, max_alpha);
+        // Nothing here depends on what is fetched, so the misses overlap.
+        for (slot, entry) in batch.iter_mut().zip(&entries[..count]) {
+            *slot = splats[entry.splat()];
+        }
+        for (entry, splat) in entries[..count].iter().zip(&batch) {
+            blend_splat(simd, tile, origin, &x, *entry, splat, max_alpha);
         }
     }
 }
@@ -56,8 +63,8 @@ fn is_visible(tile: &Tile, entry: Entry) -> bool {
 
 /// The exponent on one row: -q = conditional t^2 + (along_x dx^2 + constant), t = slope_x dx + offset.
 struct Rows {
-    /// Per row of the eight: blocks that the ellipse touches, one bit each.
-    blocks: [u32; BLOCK],
+    /// Blocks that the ellipse touches: byte r is row r, bit b of it block b.
+    blocks: u64,
     offset: [f32; BLOCK],
     constant: [f32; BLOCK],
 }
@@ -85,43 +92,41 @@ fn blend_splat<S: Lanes>(
     simd: S,
     tile: &mut Tile,
     [left, top]: [usize; 2],
+    x: &[f32x8; BLOCKS],
     entry: Entry,
     splat: &Splat,
     max_alpha: f32,
 ) {
     let [first_row, last_row] = entry.rows();
-    let columns = entry.blocks();
     let footprint = Footprint::new(simd, splat);
     let [red, green, blue] = splat.color;
     let color = [simd.splat_f32s(red), simd.splat_f32s(green), simd.splat_f32s(blue)];
     let depth = simd.splat_f32s(splat.depth);
     let opacity = simd.splat_f32s(splat.opacity);
     let max_alpha = simd.splat_f32s(max_alpha);
-    let first_x = pixel_centers(left);
-    let mut row = first_row;
-    while row <= last_row {
+    // The same blocks in each of eight rows.
+    let columns = u64::from(entry.blocks()) * 0x0101_0101_0101_0101;
+    for row in (first_row..=last_row).step_by(BLOCK) {
         let rows = footprint.rows(simd, left, top + row);
-        let count = (last_row + 1 - row).min(BLOCK);
-        for r in 0..count {
-            let live = u32::from(tile.live[row + r]);
-            let mut blocks = rows.blocks[r] & columns & live;
+        let mut live = [0; BLOCK];
+        live.copy_from_slice(&tile.live[row..row + BLOCK]);
+        // One loop over all blocks of eight rows: its end is mispredicted once, not once a row.
+        let mut blocks = rows.blocks & columns & u64::from_le_bytes(live);
+        while blocks != 0 {
+            let i = blocks.trailing_zeros() as usize;
+            blocks &= blocks - 1;
+            let (r, at) = (i / BLOCKS, i % BLOCKS);
             let offset = simd.splat_f32s(rows.offset[r]);
             let constant = simd.splat_f32s(rows.constant[r]);
-            while blocks != 0 {
-                let at = blocks.trailing_zeros() as usize % BLOCKS;
-                blocks &= blocks - 1;
-                let x = simd.add_f32s(first_x, simd.splat_f32s((at * BLOCK) as f32));
-                let exponent = footprint.exponent(simd, x, offset, constant);
-                let alpha = simd.mul_f32s(opacity, simd::exp2(simd, exponent));
-                let alpha = simd.min_f32s(alpha, max_alpha);
-                let block = &mut tile.blocks[row + r][at];
-                composite(simd, block, alpha, color, depth);
-                if simd.sign_bits(block.transmittance) == 0xff {
-                    tile.live[row + r] &= !(1 << at);
-                }
+            let exponent = footprint.exponent(simd, x[at], offset, constant);
+            let alpha = simd.mul_f32s(opacity, simd::exp2(simd, exponent));
+            let alpha = simd.min_f32s(alpha, max_alpha);
+            let block = &mut tile.blocks[row * BLOCKS + i];
+            composite(simd, block, alpha, color, depth);
+            if simd.sign_bits(block.transmittance) == 0xff {
+                tile.live[row + r] &= !(1 << at);
             }
         }
-        row += count;
     }
 }
 
@@ -188,7 +193,7 @@ impl Footprint {
         let blocks = simd.select_u32s(touched, simd.sub_u32s(two, one), simd.splat_u32s(0));
 
         Rows {
-            blocks: pulp::cast(blocks),
+            blocks: simd.low_bytes(blocks),
             offset: pulp::cast(simd.mul_f32s(self.slope_y, dy)),
             constant: pulp::cast(simd.mul_f32s(self.along_y, dy2)),
         }

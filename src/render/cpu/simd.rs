@@ -11,6 +11,9 @@ pub(super) trait Lanes: Simd<f32s = f32x8, u32s = u32x8, i32s = i32x8, m32s = m3
     /// Bit l is lane l's sign bit.
     fn sign_bits(self, a: f32x8) -> u32;
 
+    /// The low bytes of the lanes, lane 0 in the lowest; every lane is below 256.
+    fn low_bytes(self, a: u32x8) -> u64;
+
     /// a b + c, fused where that is an instruction: pulp's own on plain arrays calls the C library per lane.
     fn mul_add(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8;
 }
@@ -27,6 +30,16 @@ impl Lanes for Scalar256b {
     }
 
     #[inline(always)]
+    fn low_bytes(self, a: u32x8) -> u64 {
+        let lanes: [u32; 8] = pulp::cast(a);
+        let mut bytes = 0;
+        for (l, lane) in lanes.iter().enumerate() {
+            bytes |= u64::from(*lane) << (8 * l);
+        }
+        bytes
+    }
+
+    #[inline(always)]
     fn mul_add(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8 {
         self.add_f32s(self.mul_f32s(a, b), c)
     }
@@ -37,6 +50,14 @@ impl Lanes for pulp::x86::V3 {
     #[inline(always)]
     fn sign_bits(self, a: f32x8) -> u32 {
         self.avx._mm256_movemask_ps(pulp::cast(a)) as u32
+    }
+
+    #[inline(always)]
+    fn low_bytes(self, a: u32x8) -> u64 {
+        // Packing works within halves: lanes 0-3 end up in the low half's first four bytes, 4-7 in the high half's.
+        let words = self.avx2._mm256_packus_epi32(pulp::cast(a), pulp::cast(a));
+        let halves: [u32; 8] = pulp::cast(self.avx2._mm256_packus_epi16(words, words));
+        u64::from(halves[0]) | u64::from(halves[4]) << 32
     }
 
     #[inline(always)]
