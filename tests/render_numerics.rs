@@ -204,6 +204,7 @@ fn a_needle_of_ten_thousand_pixels_keeps_its_edge() {
     let camera = forward(512, 384, 1000.0);
     let renderer = CpuRenderer::new();
     let options = RenderOptions { depth_mode: DepthMode::Accumulated, ..options() };
+    let mut worst = 0.0f64;
     for i in 0..24 {
         let angle = 0.13 + f64::from(i) * 0.131;
         let rotation = [(angle / 2.0).cos() as f32, (angle / 2.0).sin() as f32, 0.0, 0.0];
@@ -213,9 +214,11 @@ fn a_needle_of_ten_thousand_pixels_keeps_its_edge() {
             let exact = Reference.render(&needle, &camera, &options).unwrap();
             let [_, alpha, _] = compare(&found, &exact);
             // A pixel may lie on the 1/255 cut; otherwise 1e-4 pixels across the edge.
-            assert!(alpha.p999 < 2e-4 && alpha.max < 5e-3, "angle {angle}: {alpha:?}");
+            assert!(alpha.p999 < 1e-4 && alpha.max < 5e-3, "angle {angle}: {alpha:?}");
+            worst = worst.max(alpha.max);
         }
     }
+    println!("largest error of alpha: {worst:.1e}");
 }
 
 #[test]
