@@ -8,7 +8,7 @@
 use super::splat::PixelBounds;
 use super::tile::{BLOCK, TILE_HEIGHT, TILE_WIDTH};
 use rayon::prelude::*;
-use std::ops::RangeInclusive;
+use std::ops::Range;
 
 /// Pairs held at a time: 128 MiB of entries.
 pub(super) const PAIR_BUDGET: u64 = 1 << 24;
@@ -32,9 +32,9 @@ impl Grid {
 pub(super) struct Entry(u64);
 
 impl Entry {
-    fn new(splat: u32, b: PixelBounds, left: u16, top: u16) -> Self {
-        let row = |y: u16| u64::from(y.saturating_sub(top).min(TILE_HEIGHT as u16 - 1));
-        let block = |x: u16| u64::from(x.saturating_sub(left).min(TILE_WIDTH as u16 - 1) / BLOCK as u16);
+    fn new(splat: u32, b: PixelBounds, left: usize, top: usize) -> Self {
+        let row = |y: u16| usize::from(y).saturating_sub(top).min(TILE_HEIGHT - 1) as u64;
+        let block = |x: u16| (usize::from(x).saturating_sub(left).min(TILE_WIDTH - 1) / BLOCK) as u64;
         let touched = row(b.y0) | row(b.y1) << 4 | block(b.x0) << 8 | block(b.x1) << 12;
         Self(u64::from(splat) << 32 | touched)
     }
@@ -58,18 +58,17 @@ impl Entry {
     }
 }
 
-/// Columns and rows of tiles, first and last, that pixels lie in.
-fn tile_columns(b: &PixelBounds) -> RangeInclusive<u16> {
-    b.x0 / TILE_WIDTH as u16..=b.x1 / TILE_WIDTH as u16
+/// Columns, then rows, of tiles that pixels lie in.
+fn tile_columns(b: &PixelBounds) -> Range<usize> {
+    usize::from(b.x0) / TILE_WIDTH..usize::from(b.x1) / TILE_WIDTH + 1
 }
 
-fn tile_rows(b: &PixelBounds) -> RangeInclusive<u16> {
-    b.y0 / TILE_HEIGHT as u16..=b.y1 / TILE_HEIGHT as u16
+fn tile_rows(b: &PixelBounds) -> Range<usize> {
+    usize::from(b.y0) / TILE_HEIGHT..usize::from(b.y1) / TILE_HEIGHT + 1
 }
 
 fn pairs(b: &PixelBounds) -> u64 {
-    let len = |range: RangeInclusive<u16>| u64::from(range.end() - range.start() + 1);
-    len(tile_columns(b)) * len(tile_rows(b))
+    (tile_columns(b).len() * tile_rows(b).len()) as u64
 }
 
 /// Consecutive bands with the list of each of their tiles.
@@ -94,17 +93,16 @@ impl Stripe {
 
     fn fill(&mut self, grid: Grid, first_row: usize, rows: usize, order: &[u32], bounds: &[PixelBounds]) {
         (self.first_row, self.rows, self.columns) = (first_row, rows, grid.columns);
-        let (top, bottom) = (first_row as u16, (first_row + rows - 1) as u16);
         let own_rows = |b: &PixelBounds| {
             let all = tile_rows(b);
-            (*all.start()).max(top)..=(*all.end()).min(bottom)
+            all.start.max(first_row)..all.end.min(first_row + rows)
         };
         self.ends.clear();
         self.ends.resize(rows * grid.columns, 0);
         for b in bounds {
             for row in own_rows(b) {
                 for column in tile_columns(b) {
-                    self.ends[usize::from(row - top) * grid.columns + usize::from(column)] += 1;
+                    self.ends[(row - first_row) * grid.columns + column] += 1;
                 }
             }
         }
@@ -117,9 +115,9 @@ impl Stripe {
         for (b, &splat) in bounds.iter().zip(order) {
             for row in own_rows(b) {
                 for column in tile_columns(b) {
-                    let end = &mut self.ends[usize::from(row - top) * grid.columns + usize::from(column)];
-                    let (left, top) = (column * TILE_WIDTH as u16, row * TILE_HEIGHT as u16);
-                    self.entries[*end as usize] = Entry::new(splat, *b, left, top);
+                    let end = &mut self.ends[(row - first_row) * grid.columns + column];
+                    self.entries[*end as usize] =
+                        Entry::new(splat, *b, column * TILE_WIDTH, row * TILE_HEIGHT);
                     *end += 1;
                 }
             }
