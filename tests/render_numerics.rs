@@ -347,6 +347,17 @@ fn gaussians_that_cover_a_large_picture_leave_it_even() {
 }
 
 #[test]
+fn a_hundred_thousand_walls_cost_what_the_first_few_do() {
+    // 100,000 splats on 64 x 256 tiles would be 1.6e9 pairs; the first slice finishes every pixel.
+    let n = 100_000;
+    let means = (0..n).map(|i| [5.0 + i as f32 * 1e-3, 0.0, 0.0]).collect();
+    let g =
+        Gaussians::from_arrays(0, means, vec![UNIT; n], vec![[1e5; 3]; n], vec![0.9; n], vec![0.0; 3 * n]);
+    let picture = CpuRenderer::new().render(&g.unwrap(), &forward(4096, 4096, 4000.0), &options()).unwrap();
+    assert!(picture.alpha.iter().all(|a| *a > 0.99));
+}
+
+#[test]
 fn the_largest_picture_is_drawn() {
     let g = random(12, 200, 0, [0.01, 0.1]);
     let camera = looking_at_origin(8192, 8192, DVec3::new(1.0, -0.3, 0.2), 7.0);

@@ -8,7 +8,7 @@
 use super::bin::Entry;
 use super::simd::{self, Lanes};
 use super::splat::Splat;
-use super::tile::{BLOCK, BLOCKS, Block, TILE_HEIGHT, TILE_WIDTH, Tile};
+use super::tile::{BLOCK, BLOCKS, Block, TILE_WIDTH, Tile};
 use crate::render::options::{ALPHA_THRESHOLD, TRANSMITTANCE_THRESHOLD};
 use pulp::f32x8;
 
@@ -32,7 +32,7 @@ pub(super) fn blend<S: Lanes>(
     let mut entries = [Entry::default(); BATCH];
     let mut batch = [Splat::default(); BATCH];
     for list in list.chunks(BATCH) {
-        if tile.live == [0; TILE_HEIGHT + 8] {
+        if !tile.is_live() {
             return;
         }
         let mut count = 0;

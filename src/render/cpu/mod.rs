@@ -202,11 +202,15 @@ fn draw<S: Lanes>(
         let last = drawn == order.len();
         bin::bin(grid, &order[slice.clone()], &bounds[slice], stripes);
         let binned = Instant::now();
-        blend_all(simd, grid, stripes, splats, options, target, [first, last]);
+        let unfinished = blend_all(simd, grid, stripes, splats, options, target, [first, last]);
         times.bin += binned - begin;
         times.blend += binned.elapsed();
         if last {
             return times;
+        }
+        if !unfinished {
+            // Nothing farther can show; an empty slice completes the picture.
+            drawn = order.len();
         }
     }
 }
@@ -246,7 +250,7 @@ fn resize(target: &mut Rendered, width: u32, height: u32) {
     target.depth.resize(pixels, 0.0);
 }
 
-/// Blends one slice of the depth order into every tile, a band of rows per task.
+/// Blends one slice of the depth order into every tile, a band of rows per task; whether a pixel is unfinished.
 fn blend_all<S: Lanes>(
     simd: S,
     grid: Grid,
@@ -255,12 +259,13 @@ fn blend_all<S: Lanes>(
     options: &RenderOptions,
     target: &mut Rendered,
     [first, last]: [bool; 2],
-) {
+) -> bool {
     let width = target.width as usize;
     let band = TILE_HEIGHT * width;
     let planes = target.color.par_chunks_mut(band).zip(target.alpha.par_chunks_mut(band));
     let bands = planes.zip(target.depth.par_chunks_mut(band)).enumerate();
-    bands.with_max_len(1).for_each_init(Tile::new, |tile, (row, ((color, alpha), depth))| {
+    let blend_band = |tile: &mut Tile, (row, ((color, alpha), depth))| {
+        let mut unfinished = false;
         let mut planes = Planes { color, alpha, depth, width };
         let stripe = bin::stripe_of(stripes, row);
         for column in 0..grid.columns {
@@ -280,13 +285,17 @@ fn blend_all<S: Lanes>(
             } else {
                 tile.store_unfinished(&mut planes, x0);
             }
+            unfinished |= tile.is_live();
         }
-    });
+        unfinished
+    };
+    bands.with_max_len(1).map_init(Tile::new, blend_band).reduce(|| false, |a, b| a | b)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gaussians::buffer::Gaussian;
     use crate::geometry::Pose;
     use crate::geometry::camera::Intrinsics;
 
@@ -303,11 +312,25 @@ mod tests {
         let intrinsics = Intrinsics { fx: 150.0, fy: 150.0, cx: 75.0, cy: 50.0 };
         let camera = Camera::pinhole(150, 100, intrinsics, Pose::IDENTITY).unwrap();
         let options = RenderOptions::default();
-        let expected = CpuRenderer::new().render(&gaussians, &camera, &options).unwrap();
-        assert!(expected.alpha.iter().any(|&a| a > 0.999));
-        for pair_budget in [1, 10, 100, 1000] {
-            let sliced = CpuRenderer { pair_budget, ..CpuRenderer::new() };
-            assert!(sliced.render(&gaussians, &camera, &options).unwrap() == expected, "{pair_budget} pairs");
+        // A wall in the middle finishes every pixel before the last slice.
+        let mut with_wall = gaussians.clone();
+        for _ in 0..20 {
+            with_wall.push(&Gaussian {
+                mean: [0.0, 0.0, 4.0],
+                rotation: [1.0, 0.0, 0.0, 0.0],
+                scale: [100.0, 100.0, 0.01],
+                opacity: 0.9,
+                sh0: [0.1, 0.2, 0.3],
+            });
+        }
+        for scene in [gaussians, with_wall] {
+            let expected = CpuRenderer::new().render(&scene, &camera, &options).unwrap();
+            assert!(expected.alpha.iter().any(|&a| a > 0.999));
+            for pair_budget in [1, 10, 100, 1000] {
+                let sliced = CpuRenderer { pair_budget, ..CpuRenderer::new() };
+                let found = sliced.render(&scene, &camera, &options).unwrap();
+                assert!(found == expected, "{pair_budget} pairs");
+            }
         }
     }
 }

@@ -76,6 +76,12 @@ impl Tile {
         }
     }
 
+    /// Whether a pixel is not finished.
+    #[inline(always)]
+    pub(super) fn is_live(&self) -> bool {
+        self.live != [0; TILE_HEIGHT + 8]
+    }
+
     /// Takes up where an earlier slice of the depth order left off (see [`Tile::store_unfinished`]).
     pub(super) fn load(&mut self, planes: &Planes, x0: usize) {
         self.clear(planes, x0);
