@@ -83,7 +83,7 @@ fn text(folder: &Path, split: &split::Split, hull: &Measured, given: &Measured) 
         ("report.json", "stage times, counts, what was left out and why"),
         ("scene", "the sample itself, to try the other commands on"),
     ];
-    let files = written.map(|(name, what)| format!("  {:<12} {what}", name));
+    let files = written.map(|(name, what)| format!("  {name:<12} {what}"));
     [
         format!(
             "{} photographs of the right side in; errors in {} photographs of the left side:",
