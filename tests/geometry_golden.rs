@@ -221,9 +221,10 @@ fn undistorted_dots_lie_where_the_pinhole_projects_them_to_a_tenth_of_a_pixel() 
             for (k, weight) in weights.into_iter().enumerate() {
                 let Some(found) = centroid(&view.camera, at, 24, weight) else { continue };
                 let shift = [found[0] - at[0], found[1] - at[1]];
-                // The nearest pixel may be half a pixel off, and where the map is nearly a translation all pixels
-                // of a dot are off alike; a picture is sampled between the pixels.
-                let allowed = if k == 0 { 0.1 } else { 0.5 };
+                // Pictures and silhouettes are sampled between the pixels; a small silhouette is then rounded to
+                // whole ones. A depth dot's rim is a depth edge, which keeps to whole pixels: where the map is
+                // nearly a translation, all of them shift alike.
+                let allowed = [0.1, 0.3, 0.5][k];
                 assert!(shift.iter().all(|s| s.abs() <= allowed), "{name} {k} at {at:?}: {shift:?}");
                 mean[k] = [mean[k][0] + shift[0], mean[k][1] + shift[1]];
                 seen += 1;

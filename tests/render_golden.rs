@@ -128,6 +128,16 @@ fn print_row(name: &str, d: &[Difference; 3]) {
     println!();
 }
 
+/// What the golden renders' own code gives in float32, with the plain conic, where it is recorded.
+fn print_plain_f32(npz: &Npz, case: &Case) {
+    let planes = ["color", "alpha", "depth"].map(|name| npz.get(&format!("{name}_f32_cam0{}", case.suffix)));
+    if let [Some(color), Some(alpha), _] = planes {
+        let depth = planes[2].map_or(&npz.array(&format!("depth_cam0{}", case.suffix)).values, |d| &d.values);
+        let d = against_golden(npz, &case.suffix, &color.values, &alpha.values, depth);
+        print_row("  plain conic in f32, no depth", &d);
+    }
+}
+
 fn for_each_case(
     renderer: &str,
     mut check: impl FnMut(&Npz, &Case, &Camera) -> [Difference; 3],
@@ -141,6 +151,9 @@ fn for_each_case(
         for case in cases(file, &npz) {
             let d = check(&npz, &case, &camera);
             print_row(&case.name, &d);
+            if renderer == "f32" {
+                print_plain_f32(&npz, &case);
+            }
             // Gaussians hold unit quaternions in f32; the golden renders normalise in f64. The rounding turns a
             // needle of axis ratio 1e4 by its own angle of 6e-8, which the f64 renderer shows alone.
             let needle = case.name.contains("needle_ratio_1e4");

@@ -1,8 +1,8 @@
 //! Views of distorted cameras resampled onto a pinhole that holds all they saw.
 //!
-//! Kernels know pinholes only. Pictures are resampled bilinearly, masks and depth by the nearest pixel (an edge
-//! between two depths is not a surface); pinhole pixels that the lens did not see are labelled unknown, so that
-//! nobody takes them for background.
+//! Kernels know pinholes only. Pictures and silhouettes are resampled bilinearly; depth likewise within one
+//! surface, by the nearest pixel elsewhere (an edge between two depths is not a surface). Pinhole pixels that the
+//! lens did not see are labelled unknown, so that nobody takes them for background.
 
 use super::mask::{Label, Mask};
 use super::{DepthMap, RgbImage, View};
@@ -25,22 +25,20 @@ pub fn undistorted(view: &View) -> Result<View> {
     let inside = |p: &[f32; 2]| {
         p[0] >= 0.0 && p[1] >= 0.0 && p[0] < view.camera.width as f32 && p[1] < view.camera.height as f32
     };
-    let nearest = |p: &[f32; 2]| p[1] as usize * view.camera.width as usize + p[0] as usize;
     let (width, height) = (camera.width, camera.height);
 
     let pixels = map.iter().map(|p| if inside(p) { bilinear(&view.image, *p) } else { [0; 3] }).collect();
-    let labels = map
-        .iter()
-        .map(|p| match &view.mask {
-            _ if !inside(p) => Label::Unknown,
-            Some(mask) => mask.labels()[nearest(p)],
-            None => Label::Vehicle,
-        })
-        .collect();
+    let label = |p: &[f32; 2]| match &view.mask {
+        _ if !inside(p) => Label::Unknown,
+        Some(mask) => label_at(mask, &Taps::new(*p, mask.width(), mask.height())),
+        None => Label::Vehicle,
+    };
+    let labels = map.iter().map(label).collect();
     let depth = match &view.depth {
         None => None,
         Some(depth) => {
-            let sample = |p: &[f32; 2]| if inside(p) { depth.depth()[nearest(p)] } else { 0.0 };
+            let taps = |p: &[f32; 2]| Taps::new(*p, depth.width(), depth.height());
+            let sample = |p: &[f32; 2]| if inside(p) { depth_at(depth, &taps(p)) } else { 0.0 };
             Some(DepthMap::new(width, height, map.iter().map(sample).collect())?)
         }
     };
@@ -116,19 +114,63 @@ fn source_pixels(pinhole: &Camera, source: &Camera) -> Vec<[f32; 2]> {
     (0..pinhole.height).into_par_iter().flat_map_iter(row).collect()
 }
 
-/// Bilinear sample; pixel centres at (u + 0.5, v + 0.5), edges repeated.
-pub(crate) fn bilinear(image: &RgbImage, [x, y]: [f32; 2]) -> [u8; 3] {
-    let (x, y) = (x - 0.5, y - 0.5);
-    let (fx, fy) = (x - x.floor(), y - y.floor());
-    let at = |dx: i32, dy: i32| {
-        let u = (x.floor() as i32 + dx).clamp(0, image.width() as i32 - 1) as u32;
-        let v = (y.floor() as i32 + dy).clamp(0, image.height() as i32 - 1) as u32;
-        image.get(u, v).map(f32::from)
-    };
-    let (a, b, c, d) = (at(0, 0), at(1, 0), at(0, 1), at(1, 1));
-    std::array::from_fn(|k| {
-        let top = a[k] + (b[k] - a[k]) * fx;
-        let bottom = c[k] + (d[k] - c[k]) * fx;
-        (top + (bottom - top) * fy).round() as u8
-    })
+/// The four pixels around a position, edges repeated, and how far it lies between them.
+struct Taps {
+    /// Row-order indices: top left, top right, bottom left, bottom right.
+    index: [usize; 4],
+    across: f32,
+    down: f32,
+}
+
+impl Taps {
+    /// Pixel centres lie at (u + 0.5, v + 0.5).
+    fn new([x, y]: [f32; 2], width: u32, height: u32) -> Self {
+        let (x, y) = (x - 0.5, y - 0.5);
+        let clamp = |v: f32, n: u32| v.clamp(0.0, (n - 1) as f32) as usize;
+        let (u, v) = (x.floor(), y.floor());
+        let (u0, u1) = (clamp(u, width), clamp(u + 1.0, width));
+        let (v0, v1) = (clamp(v, height) * width as usize, clamp(v + 1.0, height) * width as usize);
+        Self { index: [v0 + u0, v0 + u1, v1 + u0, v1 + u1], across: x - u, down: y - v }
+    }
+
+    fn blend(&self, [a, b, c, d]: [f32; 4]) -> f32 {
+        let top = a + (b - a) * self.across;
+        let bottom = c + (d - c) * self.across;
+        top + (bottom - top) * self.down
+    }
+
+    fn nearest(&self) -> usize {
+        self.index[usize::from(self.across >= 0.5) + 2 * usize::from(self.down >= 0.5)]
+    }
+}
+
+/// Bilinear colour; pixel centres at (u + 0.5, v + 0.5), edges repeated.
+pub(crate) fn bilinear(image: &RgbImage, position: [f32; 2]) -> [u8; 3] {
+    let taps = Taps::new(position, image.width(), image.height());
+    let colors = taps.index.map(|i| image.pixels()[i]);
+    std::array::from_fn(|k| taps.blend(colors.map(|c| f32::from(c[k]))).round() as u8)
+}
+
+/// Vehicle where the bilinear share of vehicle is at least half; unknown beside an unknown pixel.
+fn label_at(mask: &Mask, taps: &Taps) -> Label {
+    let labels = taps.index.map(|i| mask.labels()[i]);
+    if labels.contains(&Label::Unknown) {
+        return mask.labels()[taps.nearest()];
+    }
+    let share = taps.blend(labels.map(|l| if l == Label::Vehicle { 1.0 } else { 0.0 }));
+    if share >= 0.5 { Label::Vehicle } else { Label::Background }
+}
+
+/// Depth in metres, 0 for none: bilinear in inverse depth (linear on a plane) where all four pixels lie on the
+/// surface of the nearest one, else that pixel's own.
+fn depth_at(depth: &DepthMap, taps: &Taps) -> f32 {
+    /// Neighbours on one surface differ by less, relatively.
+    const SAME_SURFACE: f32 = 0.02;
+    let nearest = depth.depth()[taps.nearest()];
+    let around = taps.index.map(|i| depth.depth()[i]);
+    if nearest > 0.0 && around.iter().all(|d| (d - nearest).abs() < SAME_SURFACE * nearest) {
+        taps.blend(around.map(f32::recip)).recip()
+    } else {
+        nearest
+    }
 }

@@ -1,5 +1,5 @@
 //! What several test programs share: a seeded generator, scenes, and comparison of pictures.
-#![allow(dead_code)] // each test program uses a part
+#![allow(dead_code, unreachable_pub)] // each program uses a part, through a module of its own
 
 pub mod npz;
 pub mod scenes;

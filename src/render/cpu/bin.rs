@@ -5,12 +5,13 @@
 //! 8192 x 8192 pixels takes many, one after the other. Within a slice the bands are divided among stripes: every
 //! stripe scans the slice once to count and once to fill its own lists, so nothing is shared or merged.
 
-use super::splat::{PixelBounds, Splat};
-use super::tile::{TILE_HEIGHT, TILE_WIDTH};
+use super::splat::PixelBounds;
+use super::tile::{BLOCK, TILE_HEIGHT, TILE_WIDTH};
 use rayon::prelude::*;
+use std::ops::Range;
 
-/// Pairs held at a time: 64 MiB of indices.
-const PAIR_BUDGET: u64 = 1 << 24;
+/// Pairs held at a time: 128 MiB of entries.
+pub(super) const PAIR_BUDGET: u64 = 1 << 24;
 
 /// Tiles of an image.
 #[derive(Clone, Copy, Debug)]
@@ -25,25 +26,49 @@ impl Grid {
     }
 }
 
-/// Columns and rows of tiles, first and last, that a splat may touch.
+/// One splat in one tile: its index, and the rows and blocks of the tile that it may touch. Splats behind a
+/// finished part of the picture are told by the entry alone, without fetching them from memory.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct TileBounds {
-    x0: u16,
-    x1: u16,
-    y0: u16,
-    y1: u16,
+pub(super) struct Entry(u64);
+
+impl Entry {
+    fn new(splat: u32, b: PixelBounds, left: usize, top: usize) -> Self {
+        let row = |y: u16| usize::from(y).saturating_sub(top).min(TILE_HEIGHT - 1) as u64;
+        let block = |x: u16| (usize::from(x).saturating_sub(left).min(TILE_WIDTH - 1) / BLOCK) as u64;
+        let touched = row(b.y0) | row(b.y1) << 4 | block(b.x0) << 8 | block(b.x1) << 12;
+        Self(u64::from(splat) << 32 | touched)
+    }
+
+    /// Index of the splat.
+    #[inline(always)]
+    pub(super) fn splat(self) -> usize {
+        (self.0 >> 32) as usize
+    }
+
+    /// First and last row of the tile.
+    #[inline(always)]
+    pub(super) fn rows(self) -> [usize; 2] {
+        [self.0 as usize & 15, (self.0 >> 4) as usize & 15]
+    }
+
+    /// One bit per block of a row.
+    #[inline(always)]
+    pub(super) fn blocks(self) -> u32 {
+        (2u32 << ((self.0 >> 12) & 7)) - (1u32 << ((self.0 >> 8) & 7))
+    }
 }
 
-impl TileBounds {
-    fn new(b: PixelBounds) -> Self {
-        const W: u16 = TILE_WIDTH as u16;
-        const H: u16 = TILE_HEIGHT as u16;
-        Self { x0: b.x0 / W, x1: b.x1 / W, y0: b.y0 / H, y1: b.y1 / H }
-    }
+/// Columns, then rows, of tiles that pixels lie in.
+fn tile_columns(b: &PixelBounds) -> Range<usize> {
+    usize::from(b.x0) / TILE_WIDTH..usize::from(b.x1) / TILE_WIDTH + 1
+}
 
-    fn pairs(self) -> u64 {
-        u64::from(self.x1 - self.x0 + 1) * u64::from(self.y1 - self.y0 + 1)
-    }
+fn tile_rows(b: &PixelBounds) -> Range<usize> {
+    usize::from(b.y0) / TILE_HEIGHT..usize::from(b.y1) / TILE_HEIGHT + 1
+}
+
+fn pairs(b: &PixelBounds) -> u64 {
+    (tile_columns(b).len() * tile_rows(b).len()) as u64
 }
 
 /// Consecutive bands with the list of each of their tiles.
@@ -54,31 +79,30 @@ pub(super) struct Stripe {
     columns: usize,
     /// Where each tile's list ends. `[rows * columns]`
     ends: Vec<u32>,
-    /// Splat indices, tile after tile, nearest first.
-    splats: Vec<u32>,
+    /// Tile after tile, nearest first.
+    entries: Vec<Entry>,
 }
 
 impl Stripe {
     /// The splats of the tile in column `column` of band `row` of the image, nearest first.
-    pub(super) fn tile(&self, column: usize, row: usize) -> &[u32] {
+    pub(super) fn tile(&self, column: usize, row: usize) -> &[Entry] {
         let tile = (row - self.first_row) * self.columns + column;
         let start = if tile == 0 { 0 } else { self.ends[tile - 1] };
-        &self.splats[start as usize..self.ends[tile] as usize]
+        &self.entries[start as usize..self.ends[tile] as usize]
     }
 
-    fn fill(&mut self, grid: Grid, first_row: usize, rows: usize, order: &[u32], bounds: &[TileBounds]) {
+    fn fill(&mut self, grid: Grid, first_row: usize, rows: usize, order: &[u32], bounds: &[PixelBounds]) {
         (self.first_row, self.rows, self.columns) = (first_row, rows, grid.columns);
-        let (top, bottom) = (first_row as u16, (first_row + rows - 1) as u16);
+        let own_rows = |b: &PixelBounds| {
+            let all = tile_rows(b);
+            all.start.max(first_row)..all.end.min(first_row + rows)
+        };
         self.ends.clear();
         self.ends.resize(rows * grid.columns, 0);
-        let overlapping = |b: &TileBounds| b.y0 <= bottom && b.y1 >= top;
-        // Rows of this stripe, as slices of `ends`.
-        let tile_rows = |b: &TileBounds| b.y0.max(top) - top..=b.y1.min(bottom) - top;
-        for b in bounds.iter().filter(|b| overlapping(b)) {
-            for row in tile_rows(b) {
-                let row = usize::from(row) * grid.columns;
-                for count in &mut self.ends[row + usize::from(b.x0)..=row + usize::from(b.x1)] {
-                    *count += 1;
+        for b in bounds {
+            for row in own_rows(b) {
+                for column in tile_columns(b) {
+                    self.ends[(row - first_row) * grid.columns + column] += 1;
                 }
             }
         }
@@ -87,12 +111,13 @@ impl Stripe {
         for count in &mut self.ends {
             total += std::mem::replace(count, total);
         }
-        self.splats.resize(total as usize, 0);
-        for (b, &splat) in bounds.iter().zip(order).filter(|(b, _)| overlapping(b)) {
-            for row in tile_rows(b) {
-                let row = usize::from(row) * grid.columns;
-                for end in &mut self.ends[row + usize::from(b.x0)..=row + usize::from(b.x1)] {
-                    self.splats[*end as usize] = splat;
+        self.entries.resize(total as usize, Entry::default());
+        for (b, &splat) in bounds.iter().zip(order) {
+            for row in own_rows(b) {
+                for column in tile_columns(b) {
+                    let end = &mut self.ends[(row - first_row) * grid.columns + column];
+                    self.entries[*end as usize] =
+                        Entry::new(splat, *b, column * TILE_WIDTH, row * TILE_HEIGHT);
                     *end += 1;
                 }
             }
@@ -100,29 +125,25 @@ impl Stripe {
     }
 }
 
-/// Tile bounds in depth order.
-pub(super) fn tile_bounds(order: &[u32], splats: &[Splat], bounds: &mut Vec<TileBounds>) {
-    order
-        .par_iter()
-        .with_min_len(1 << 12)
-        .map(|&i| TileBounds::new(splats[i as usize].bounds))
-        .collect_into_vec(bounds);
+/// The splats' bounds in depth order.
+pub(super) fn bounds_in_order(order: &[u32], bounds: &[PixelBounds], sorted: &mut Vec<PixelBounds>) {
+    order.par_iter().with_min_len(1 << 12).map(|&i| bounds[i as usize]).collect_into_vec(sorted);
 }
 
-/// How many of the nearest splats make at most [`PAIR_BUDGET`] pairs; at least one where there is one.
-pub(super) fn slice_len(bounds: &[TileBounds]) -> usize {
-    let mut pairs = 0;
+/// How many of the nearest splats make at most `budget` pairs; at least one where there is one.
+pub(super) fn slice_len(bounds: &[PixelBounds], budget: u64) -> usize {
+    let mut total = 0;
     let fitting = bounds.iter().position(|b| {
-        pairs += b.pairs();
-        pairs > PAIR_BUDGET
+        total += pairs(b);
+        total > budget
     });
     fitting.map_or(bounds.len(), |n| n.max(1))
 }
 
 /// Bins one slice of the depth order; `stripes` is reused from picture to picture.
-pub(super) fn bin(grid: Grid, order: &[u32], bounds: &[TileBounds], stripes: &mut Vec<Stripe>) {
-    // Each stripe scans everything, so no more of them than keep the threads evenly busy.
-    let count = (2 * rayon::current_num_threads()).clamp(1, grid.rows);
+pub(super) fn bin(grid: Grid, order: &[u32], bounds: &[PixelBounds], stripes: &mut Vec<Stripe>) {
+    // Each stripe scans everything, so no more of them than there are threads.
+    let count = rayon::current_num_threads().clamp(1, grid.rows);
     stripes.resize_with(count, Stripe::default);
     stripes.par_iter_mut().enumerate().for_each(|(i, stripe)| {
         let first = i * grid.rows / count;

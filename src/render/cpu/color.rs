@@ -37,16 +37,18 @@ pub(super) fn color(sh: &[f32], basis: &[f32; 16], coefficients: usize) -> [f32;
     // which is computed and ignored. So no load reaches past the end of the array.
     let mut sum = [0.0f32; 4];
     for k in 1..coefficients {
-        let four: &[f32; 4] = sh[3 * k - 1..3 * k + 3].try_into().expect("four floats");
+        let four = &sh[3 * k - 1..3 * k + 3];
         for lane in 0..4 {
             sum[lane] += basis[k] * four[lane];
         }
     }
-    std::array::from_fn(|c| {
+    let mut rgb = [0.0; 3];
+    for c in 0..3 {
         let value = 0.5 + (basis[0] * sh[c] + sum[c + 1]);
         // NaN (infinity minus infinity) becomes 0, which `clamp` would not do.
-        if value > 0.0 { value.min(MAX_COLOR) } else { 0.0 }
-    })
+        rgb[c] = if value > 0.0 { value.min(MAX_COLOR) } else { 0.0 };
+    }
+    rgb
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! The fast renderer: f32 blending on the processor's vectors, rows of ellipses instead of tiles of pixels.
 //!
-//! Stages, in order: [`project`] (f64, eight Gaussians at a time), [`sort`] (depth bits), [`bin`] (which tile),
-//! [`blend`]. It runs in the rayon pool it is called from and draws the same bytes with any number of threads.
+//! Stages, in order: `project` (f64, eight Gaussians at a time), `sort` (depth bits), `bin` (which tile), `blend`.
+//! It runs in the rayon pool it is called from and draws the same bytes with any number of threads.
+//! `docs/RENDERER.md` has the measurements behind each choice.
 
 mod bin;
 mod blend;
@@ -18,10 +19,10 @@ use crate::gaussians::Gaussians;
 use crate::geometry::Camera;
 use crate::render::distorted::LensMap;
 use crate::render::{RenderOptions, Rendered, Renderer};
-use bin::{Grid, Stripe, TileBounds};
+use bin::{Grid, Stripe};
 use rayon::prelude::*;
 use simd::Lanes;
-use splat::Splat;
+use splat::{PixelBounds, Splat};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tile::{Planes, TILE_HEIGHT, TILE_WIDTH, Tile};
@@ -42,6 +43,8 @@ enum Level {
 #[derive(Debug)]
 pub struct CpuRenderer {
     level: Level,
+    /// See `bin::PAIR_BUDGET`; tests lower it.
+    pair_budget: u64,
     scratch: Mutex<Vec<Scratch>>,
     /// Of the last lens drawn: inverting it takes longer than drawing.
     lens: Mutex<Option<Arc<LensMap>>>,
@@ -65,10 +68,12 @@ pub struct StageTimes {
 struct Scratch {
     splats: Vec<Splat>,
     keys: Vec<u32>,
+    pixel_bounds: Vec<PixelBounds>,
     entries: Vec<u64>,
     entries_other: Vec<u64>,
     order: Vec<u32>,
-    bounds: Vec<TileBounds>,
+    /// In depth order.
+    bounds: Vec<PixelBounds>,
     stripes: Vec<Stripe>,
 }
 
@@ -94,7 +99,7 @@ impl CpuRenderer {
     }
 
     fn with_level(level: Level) -> Self {
-        Self { level, scratch: Mutex::default(), lens: Mutex::default() }
+        Self { level, pair_budget: bin::PAIR_BUDGET, scratch: Mutex::default(), lens: Mutex::default() }
     }
 
     /// The instructions in use: `"avx2+fma"` or `"portable"`.
@@ -106,7 +111,8 @@ impl CpuRenderer {
         }
     }
 
-    /// As [`Renderer::render`] for a pinhole camera, into a picture whose memory is reused.
+    /// As [`Renderer::render`], into a picture whose memory is reused. The times are of a pinhole camera's stages, and
+    /// zero through a lens.
     pub fn render_into(
         &self,
         gaussians: &Gaussians,
@@ -123,8 +129,12 @@ impl CpuRenderer {
         let mut scratch = self.pool().pop().unwrap_or_default();
         let times = match self.level {
             #[cfg(target_arch = "x86_64")]
-            Level::Avx2(simd) => draw(simd, gaussians, camera, options, &mut scratch, target),
-            Level::Portable(simd) => draw(simd, gaussians, camera, options, &mut scratch, target),
+            Level::Avx2(simd) => {
+                draw(simd, gaussians, camera, options, self.pair_budget, &mut scratch, target)
+            }
+            Level::Portable(simd) => {
+                draw(simd, gaussians, camera, options, self.pair_budget, &mut scratch, target)
+            }
         };
         self.pool().push(scratch);
         Ok(times)
@@ -161,6 +171,7 @@ fn draw<S: Lanes>(
     gaussians: &Gaussians,
     camera: &Camera,
     options: &RenderOptions,
+    pair_budget: u64,
     scratch: &mut Scratch,
     target: &mut Rendered,
 ) -> StageTimes {
@@ -172,40 +183,51 @@ fn draw<S: Lanes>(
     let sorted = Instant::now();
 
     let grid = Grid::new(camera.width, camera.height);
-    let Scratch { splats, order, bounds, stripes, .. } = scratch;
+    let Scratch { splats, pixel_bounds, order, bounds, stripes, .. } = scratch;
     resize(target, camera.width, camera.height);
-    bin::tile_bounds(order, splats, bounds);
-    let mut times =
-        StageTimes { project: projected - start, sort: sorted - projected, ..StageTimes::default() };
+    bin::bounds_in_order(order, pixel_bounds, bounds);
+    let mut times = StageTimes {
+        project: projected - start,
+        sort: sorted - projected,
+        bin: sorted.elapsed(),
+        blend: Duration::ZERO,
+    };
     let mut drawn = 0;
     // Runs once for an empty scene too, to draw the background.
     loop {
         let begin = Instant::now();
         let first = drawn == 0;
-        let slice = drawn..drawn + bin::slice_len(&bounds[drawn..]);
+        let slice = drawn..drawn + bin::slice_len(&bounds[drawn..], pair_budget);
         drawn = slice.end;
         let last = drawn == order.len();
         bin::bin(grid, &order[slice.clone()], &bounds[slice], stripes);
         let binned = Instant::now();
-        blend_all(simd, grid, stripes, splats, options, target, [first, last]);
+        let unfinished = blend_all(simd, grid, stripes, splats, options, target, [first, last]);
         times.bin += binned - begin;
         times.blend += binned.elapsed();
         if last {
             return times;
+        }
+        if !unfinished {
+            // Nothing farther can show; an empty slice completes the picture.
+            drawn = order.len();
         }
     }
 }
 
 fn project_all<S: Lanes>(simd: S, view: &PinholeView, gaussians: &Gaussians, scratch: &mut Scratch) {
     let n = gaussians.len();
-    scratch.splats.resize(n, Splat::default());
-    scratch.keys.resize(n, 0);
-    let chunks = scratch.splats.par_chunks_mut(PROJECT_CHUNK).zip(scratch.keys.par_chunks_mut(PROJECT_CHUNK));
-    chunks.enumerate().for_each(|(i, (splats, keys))| {
+    let Scratch { splats, keys, pixel_bounds, .. } = scratch;
+    splats.resize(n, Splat::default());
+    keys.resize(n, 0);
+    pixel_bounds.resize(n, PixelBounds::default());
+    let chunks = splats.par_chunks_mut(PROJECT_CHUNK).zip(keys.par_chunks_mut(PROJECT_CHUNK));
+    let chunks = chunks.zip(pixel_bounds.par_chunks_mut(PROJECT_CHUNK));
+    chunks.enumerate().for_each(|(i, ((splats, keys), bounds))| {
         let range = i * PROJECT_CHUNK..i * PROJECT_CHUNK + keys.len();
         simd.vectorize(
             #[inline(always)]
-            || project::project(view, gaussians, range, splats, keys),
+            || project::project(view, gaussians, range, splats, keys, bounds),
         );
     });
 }
@@ -228,7 +250,7 @@ fn resize(target: &mut Rendered, width: u32, height: u32) {
     target.depth.resize(pixels, 0.0);
 }
 
-/// Blends one slice of the depth order into every tile, a band of rows per task.
+/// Blends one slice of the depth order into every tile, a band of rows per task; whether a pixel is unfinished.
 fn blend_all<S: Lanes>(
     simd: S,
     grid: Grid,
@@ -237,12 +259,13 @@ fn blend_all<S: Lanes>(
     options: &RenderOptions,
     target: &mut Rendered,
     [first, last]: [bool; 2],
-) {
+) -> bool {
     let width = target.width as usize;
     let band = TILE_HEIGHT * width;
     let planes = target.color.par_chunks_mut(band).zip(target.alpha.par_chunks_mut(band));
     let bands = planes.zip(target.depth.par_chunks_mut(band)).enumerate();
-    bands.with_max_len(1).for_each_init(Tile::new, |tile, (row, ((color, alpha), depth))| {
+    let blend_band = |tile: &mut Tile, (row, ((color, alpha), depth))| {
+        let mut unfinished = false;
         let mut planes = Planes { color, alpha, depth, width };
         let stripe = bin::stripe_of(stripes, row);
         for column in 0..grid.columns {
@@ -262,6 +285,52 @@ fn blend_all<S: Lanes>(
             } else {
                 tile.store_unfinished(&mut planes, x0);
             }
+            unfinished |= tile.is_live();
         }
-    });
+        unfinished
+    };
+    bands.with_max_len(1).map_init(Tile::new, blend_band).reduce(|| false, |a, b| a | b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gaussians::buffer::Gaussian;
+    use crate::geometry::Pose;
+    use crate::geometry::camera::Intrinsics;
+
+    #[test]
+    fn depth_slices_of_any_size_draw_the_same_bytes() {
+        let n = 400;
+        let at = |i: usize, k: usize| ((i * 7919 + k * 104_729) % 1000) as f32 / 1000.0 - 0.5;
+        let means = (0..n).map(|i| [2.0 * at(i, 0), 2.0 * at(i, 1), 4.0 + at(i, 2)]).collect();
+        let rotations = (0..n).map(|i| [at(i, 3), at(i, 4), at(i, 5), 1.0]).collect();
+        let scales = (0..n).map(|i| [0.3, 0.02, 0.1 + 0.1 * at(i, 6)]).collect();
+        let opacities = (0..n).map(|i| 0.5 + at(i, 7)).collect();
+        let sh = (0..3 * n).map(|i| at(i, 8)).collect();
+        let gaussians = Gaussians::from_arrays(0, means, rotations, scales, opacities, sh).unwrap();
+        let intrinsics = Intrinsics { fx: 150.0, fy: 150.0, cx: 75.0, cy: 50.0 };
+        let camera = Camera::pinhole(150, 100, intrinsics, Pose::IDENTITY).unwrap();
+        let options = RenderOptions::default();
+        // A wall in the middle finishes every pixel before the last slice.
+        let mut with_wall = gaussians.clone();
+        for _ in 0..20 {
+            with_wall.push(&Gaussian {
+                mean: [0.0, 0.0, 4.0],
+                rotation: [1.0, 0.0, 0.0, 0.0],
+                scale: [100.0, 100.0, 0.01],
+                opacity: 0.9,
+                sh0: [0.1, 0.2, 0.3],
+            });
+        }
+        for scene in [gaussians, with_wall] {
+            let expected = CpuRenderer::new().render(&scene, &camera, &options).unwrap();
+            assert!(expected.alpha.iter().any(|&a| a > 0.999));
+            for pair_budget in [1, 10, 100, 1000] {
+                let sliced = CpuRenderer { pair_budget, ..CpuRenderer::new() };
+                let found = sliced.render(&scene, &camera, &options).unwrap();
+                assert!(found == expected, "{pair_budget} pairs");
+            }
+        }
+    }
 }

@@ -21,7 +21,7 @@ const HALF_LOG2_E: f64 = 0.5 * std::f64::consts::LOG2_E;
 
 const LANES: usize = 8;
 
-/// Projects the Gaussians of `range` into `splats` and `keys` (bits of z, or [`NOT_DRAWN`]); those that
+/// Projects the Gaussians of `range` into `splats`, `bounds` (the pixels they may touch) and `keys` (bits of z, or [`NOT_DRAWN`]); those that
 /// are not drawn keep an old splat.
 #[inline(always)]
 pub(super) fn project(
@@ -30,11 +30,13 @@ pub(super) fn project(
     range: Range<usize>,
     splats: &mut [Splat],
     keys: &mut [u32],
+    bounds: &mut [PixelBounds],
 ) {
     let coefficients = sh::coefficients(view.sh_degree);
     let stride = gaussians.sh_stride();
     let mut start = range.start;
-    for (splats, keys) in splats.chunks_mut(LANES).zip(keys.chunks_mut(LANES)) {
+    let groups = splats.chunks_mut(LANES).zip(keys.chunks_mut(LANES)).zip(bounds.chunks_mut(LANES));
+    for ((splats, keys), bounds) in groups {
         let mut lanes = Inputs::default();
         // A last group that is not full repeats its last Gaussian.
         for l in 0..LANES {
@@ -45,13 +47,21 @@ pub(super) fn project(
         for l in 0..LANES {
             project_lane(view, &lanes, &mut out, l);
         }
+        for l in 0..LANES {
+            out.basis[l] = color::basis(out.direction[0][l], out.direction[1][l], out.direction[2][l]);
+        }
         for l in 0..keys.len() {
             keys[l] = out.key[l];
             if out.key[l] == NOT_DRAWN {
                 continue;
             }
-            let basis: [f32; 16] = std::array::from_fn(|k| out.basis[k][l]);
             let sh = &gaussians.sh()[(start + l) * stride..(start + l + 1) * stride];
+            bounds[l] = PixelBounds {
+                x0: out.bounds[0][l] as u16,
+                x1: out.bounds[1][l] as u16,
+                y0: out.bounds[2][l] as u16,
+                y1: out.bounds[3][l] as u16,
+            };
             splats[l] = Splat {
                 center: [out.center[0][l], out.center[1][l]],
                 center_rest: [out.center_rest[0][l], out.center_rest[1][l]],
@@ -59,15 +69,12 @@ pub(super) fn project(
                 conditional: out.conditional[l],
                 marginal: out.marginal[l],
                 opacity: out.opacity[l],
-                color: color::color(sh, &basis, coefficients),
+                color: color::color(sh, &out.basis[l], coefficients),
                 depth: out.depth[l],
                 q_max: out.q_max[l],
-                bounds: PixelBounds {
-                    x0: out.bounds[0][l] as u16,
-                    x1: out.bounds[1][l] as u16,
-                    y0: out.bounds[2][l] as u16,
-                    y1: out.bounds[3][l] as u16,
-                },
+                center_slope: out.center_slope[l],
+                inverse_column: out.inverse_column[l],
+                row: out.row[l],
             };
         }
         start += LANES;
@@ -108,46 +115,61 @@ struct Outputs {
     opacity: [f32; LANES],
     depth: [f32; LANES],
     q_max: [f32; LANES],
+    center_slope: [f32; LANES],
+    inverse_column: [f32; LANES],
+    row: [f32; LANES],
     /// x0, x1, y0, y1
     bounds: [[i32; LANES]; 4],
-    basis: [[f32; LANES]; 16],
+    /// From the camera to the Gaussian, unit.
+    direction: [[f32; LANES]; 3],
+    /// Lane first: one Gaussian's functions lie together.
+    basis: [[f32; 16]; LANES],
 }
 
-/// One lane, without branches, so that the compiler turns the loop over lanes into vectors.
+/// One lane, without branches or closures, so that the compiler turns the loop over lanes into vectors.
 #[inline(always)]
 fn project_lane(view: &PinholeView, g: &Inputs, out: &mut Outputs, l: usize) {
-    let at = |v: &[f32; LANES]| f64::from(v[l]);
+    let (opacity, w) = (f64::from(g.opacity[l]), f64::from(g.rotation[0][l]));
+    let qx = f64::from(g.rotation[1][l]);
+    let qy = f64::from(g.rotation[2][l]);
+    let qz = f64::from(g.rotation[3][l]);
 
     // Camera frame; the difference first, so that a distant camera costs no digits.
-    let d: [f64; 3] = std::array::from_fn(|k| at(&g.mean[k]) - view.center[k]);
-    let p: [f64; 3] = std::array::from_fn(|k| dot(view.rotation[k], d));
-    let z = p[2];
+    let mut d = [0.0; 3];
+    for k in 0..3 {
+        d[k] = f64::from(g.mean[k][l]) - view.center[k];
+    }
+    let r = &view.rotation;
+    let z = dot(r[2], d);
     let depth = z as f32;
     let inverse_z = 1.0 / z;
-    let normalized = [p[0] * inverse_z, p[1] * inverse_z];
+    let (x, y) = (dot(r[0], d) * inverse_z, dot(r[1], d) * inverse_z);
     let i = &view.intrinsics;
-    let center = [i.fx * normalized[0] + i.cx, i.fy * normalized[1] + i.cy];
+    let (u, v) = (i.fx * x + i.cx, i.fy * y + i.cy);
 
     // Rows of J R: f/z (R_x - x/z R_z), with x/z clamped.
     let [xr, yr] = view.jacobian_range;
-    let x = normalized[0].max(xr[0]).min(xr[1]);
-    let y = normalized[1].max(yr[0]).min(yr[1]);
+    let (x, y) = (x.max(xr[0]).min(xr[1]), y.max(yr[0]).min(yr[1]));
     let (sx, sy) = (i.fx * inverse_z, i.fy * inverse_z);
-    let r = &view.rotation;
-    let jx: [f64; 3] = std::array::from_fn(|k| sx * (r[0][k] - x * r[2][k]));
-    let jy: [f64; 3] = std::array::from_fn(|k| sy * (r[1][k] - y * r[2][k]));
+    let (mut jx, mut jy) = ([0.0; 3], [0.0; 3]);
+    for k in 0..3 {
+        jx[k] = sx * (r[0][k] - x * r[2][k]);
+        jy[k] = sy * (r[1][k] - y * r[2][k]);
+    }
 
     // Rows of J R R_q S. The quaternion is unit to f32 only; 2/|q|^2 makes R_q a rotation to f64.
-    let q: [f64; 4] = std::array::from_fn(|k| at(&g.rotation[k]));
-    let [w, qx, qy, qz] = q;
     let two = 2.0 / (w * w + qx * qx + qy * qy + qz * qz);
     let columns = [
         [1.0 - two * (qy * qy + qz * qz), two * (qx * qy + w * qz), two * (qx * qz - w * qy)],
         [two * (qx * qy - w * qz), 1.0 - two * (qx * qx + qz * qz), two * (qy * qz + w * qx)],
         [two * (qx * qz + w * qy), two * (qy * qz - w * qx), 1.0 - two * (qx * qx + qy * qy)],
     ];
-    let a: [f64; 3] = std::array::from_fn(|k| dot(jx, columns[k]) * at(&g.scale[k]));
-    let b: [f64; 3] = std::array::from_fn(|k| dot(jy, columns[k]) * at(&g.scale[k]));
+    let (mut a, mut b) = ([0.0; 3], [0.0; 3]);
+    for k in 0..3 {
+        let scale = f64::from(g.scale[k][l]);
+        a[k] = dot(jx, columns[k]) * scale;
+        b[k] = dot(jy, columns[k]) * scale;
+    }
 
     // Covariance, determinant and pivot.
     let (aa, bb, covariance_xy) = (dot(a, a), dot(b, b), dot(a, b));
@@ -164,42 +186,46 @@ fn project_lane(view: &PinholeView, g: &Inputs, out: &mut Outputs, l: usize) {
     // Opacity, and how far from the centre it stays above the threshold.
     let floor = f64::from(MIN_COMPENSATION * MIN_COMPENSATION);
     let compensation = (determinant_before / determinant).max(floor).sqrt();
-    let opacity = if view.antialiased { at(&g.opacity) * compensation } else { at(&g.opacity) } as f32;
+    let opacity = if view.antialiased { opacity * compensation } else { opacity } as f32;
     let q_max = log2_at_least(opacity * (1.0 / ALPHA_THRESHOLD));
     let reach = f64::from(q_max) / HALF_LOG2_E;
     let (reach_x, reach_y) = ((reach * variance_x).sqrt(), (reach * variance_y).sqrt());
 
     // Pixel u is sampled at u + 0.5; clamping in f64 keeps the conversion in range.
     let (last_x, last_y) = (f64::from(view.width) - 1.0, f64::from(view.height) - 1.0);
-    let x0 = (center[0] - reach_x - 0.5).ceil().max(0.0).min(last_x + 1.0);
-    let x1 = (center[0] + reach_x - 0.5).floor().max(-1.0).min(last_x);
-    let y0 = (center[1] - reach_y - 0.5).ceil().max(0.0).min(last_y + 1.0);
-    let y1 = (center[1] + reach_y - 0.5).floor().max(-1.0).min(last_y);
+    let x0 = (u - reach_x - 0.5).ceil().max(0.0).min(last_x + 1.0);
+    let x1 = (u + reach_x - 0.5).floor().max(-1.0).min(last_x);
+    let y0 = (v - reach_y - 0.5).ceil().max(0.0).min(last_y + 1.0);
+    let y1 = (v + reach_y - 0.5).floor().max(-1.0).min(last_y);
 
     let drawn =
         (depth > view.near) & (depth < view.far) & (opacity >= ALPHA_THRESHOLD) & (x0 <= x1) & (y0 <= y1);
     out.key[l] = if drawn { depth.to_bits() } else { NOT_DRAWN };
+    out.bounds[0][l] = x0 as i32;
+    out.bounds[1][l] = x1 as i32;
+    out.bounds[2][l] = y0 as i32;
+    out.bounds[3][l] = y1 as i32;
 
-    for (axis, value) in center.into_iter().enumerate() {
-        let whole = value.round_ties_even() as f32;
-        out.center[axis][l] = whole;
-        out.center_rest[axis][l] = (value - f64::from(whole)) as f32;
-    }
+    let (whole_u, whole_v) = (u.round_ties_even() as f32, v.round_ties_even() as f32);
+    out.center[0][l] = whole_u;
+    out.center[1][l] = whole_v;
+    out.center_rest[0][l] = (u - f64::from(whole_u)) as f32;
+    out.center_rest[1][l] = (v - f64::from(whole_v)) as f32;
     out.slope[l] = (covariance_xy * inverse_pivot) as f32;
     out.conditional[l] = if pivot_x { -conditional } else { conditional } as f32;
     out.marginal[l] = (HALF_LOG2_E * inverse_pivot) as f32;
     out.opacity[l] = opacity;
     out.depth[l] = depth;
     out.q_max[l] = q_max;
-    for (k, value) in [x0, x1, y0, y1].into_iter().enumerate() {
-        out.bounds[k][l] = value as i32;
-    }
+    let inverse_y = 1.0 / variance_y;
+    out.center_slope[l] = (covariance_xy * inverse_y) as f32;
+    // A form wider than f32 holds stays finite: infinity times 0 would lose its rows.
+    out.inverse_column[l] = (determinant * inverse_y * (1.0 / HALF_LOG2_E)).min(1e38) as f32;
+    out.row[l] = (HALF_LOG2_E * inverse_y) as f32;
 
     let inverse_length = 1.0 / dot(d, d).sqrt().max(f64::MIN_POSITIVE);
-    let [dx, dy, dz] = d.map(|v| (v * inverse_length) as f32);
-    let basis = color::basis(dx, dy, dz);
-    for k in 0..16 {
-        out.basis[k][l] = basis[k];
+    for k in 0..3 {
+        out.direction[k][l] = (d[k] * inverse_length) as f32;
     }
 }
 

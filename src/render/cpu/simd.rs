@@ -6,10 +6,16 @@
 
 use pulp::{Scalar256b, Simd, f32x8, i32x8, m32x8, u32x8};
 
-/// A vector width of eight, with the two operations pulp has no portable name for.
+/// A vector width of eight, with two operations that pulp has no fitting one for.
 pub(super) trait Lanes: Simd<f32s = f32x8, u32s = u32x8, i32s = i32x8, m32s = m32x8> {
     /// Bit l is lane l's sign bit.
     fn sign_bits(self, a: f32x8) -> u32;
+
+    /// The low bytes of the lanes, lane 0 in the lowest; every lane is below 256.
+    fn low_bytes(self, a: u32x8) -> u64;
+
+    /// a b + c, fused where that is an instruction: pulp's own on plain arrays calls the C library per lane.
+    fn mul_add(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8;
 }
 
 impl Lanes for Scalar256b {
@@ -22,6 +28,21 @@ impl Lanes for Scalar256b {
         }
         bits
     }
+
+    #[inline(always)]
+    fn low_bytes(self, a: u32x8) -> u64 {
+        let lanes: [u32; 8] = pulp::cast(a);
+        let mut bytes = 0;
+        for (l, lane) in lanes.iter().enumerate() {
+            bytes |= u64::from(*lane) << (8 * l);
+        }
+        bytes
+    }
+
+    #[inline(always)]
+    fn mul_add(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8 {
+        self.add_f32s(self.mul_f32s(a, b), c)
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -29,6 +50,19 @@ impl Lanes for pulp::x86::V3 {
     #[inline(always)]
     fn sign_bits(self, a: f32x8) -> u32 {
         self.avx._mm256_movemask_ps(pulp::cast(a)) as u32
+    }
+
+    #[inline(always)]
+    fn low_bytes(self, a: u32x8) -> u64 {
+        // Packing works within halves: lanes 0-3 end up in the low half's first four bytes, 4-7 in the high half's.
+        let words = self.avx2._mm256_packus_epi32(pulp::cast(a), pulp::cast(a));
+        let halves: [u32; 8] = pulp::cast(self.avx2._mm256_packus_epi16(words, words));
+        u64::from(halves[0]) | u64::from(halves[4]) << 32
+    }
+
+    #[inline(always)]
+    fn mul_add(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8 {
+        self.mul_add_f32s(a, b, c)
     }
 }
 
@@ -48,7 +82,7 @@ pub(super) fn exp2<S: Lanes>(simd: S, x: f32x8) -> f32x8 {
     let f = simd.sub_f32s(x, simd.sub_f32s(shifted, simd.splat_f32s(ROUND)));
     let mut poly = simd.splat_f32s(EXP2_COEFFICIENTS[0]);
     for c in &EXP2_COEFFICIENTS[1..] {
-        poly = simd.mul_add_e_f32s(poly, f, simd.splat_f32s(*c));
+        poly = simd.mul_add(poly, f, simd.splat_f32s(*c));
     }
     // The integer sits in the low bits of `shifted`; moved into the exponent field it multiplies by 2^n.
     let n = simd.wrapping_dyn_shl_u32s(simd.transmute_u32s_f32s(shifted), simd.splat_u32s(23));

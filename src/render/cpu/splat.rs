@@ -36,5 +36,9 @@ pub(super) struct Splat {
     pub(super) depth: f32,
     /// Not less than log2(255 opacity): where q exceeds this, alpha is below 1/255.
     pub(super) q_max: f32,
-    pub(super) bounds: PixelBounds,
+    /// The same form completed in x whichever the pivot is, for the width of a row:
+    /// q = (dx - center_slope dy)^2 / inverse_column + row dy^2, with b/c, det/c 2/log2(e) and log2(e)/2 / c.
+    pub(super) center_slope: f32,
+    pub(super) inverse_column: f32,
+    pub(super) row: f32,
 }

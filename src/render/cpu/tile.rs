@@ -29,9 +29,11 @@ const ZERO: f32x8 = f32x8(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
 /// Transmittance, colour and depth of 64 x 16 pixels.
 #[derive(Debug)]
 pub(super) struct Tile {
-    pub(super) blocks: [[Block; BLOCKS]; TILE_HEIGHT],
-    /// Bit b of entry r: block b of row r has a pixel that is not finished.
-    pub(super) live: [u8; TILE_HEIGHT],
+    /// Row by row.
+    pub(super) blocks: [Block; BLOCKS * TILE_HEIGHT],
+    /// Bit b of entry r: block b of row r has a pixel that is not finished. Eight rows beyond the last are never
+    /// live, so that eight can be read from any row on.
+    pub(super) live: [u8; TILE_HEIGHT + 8],
 }
 
 /// One tile's rows in the picture's planes.
@@ -56,13 +58,13 @@ impl Planes<'_> {
 impl Tile {
     pub(super) fn new() -> Self {
         let block = Block { transmittance: ZERO, color: [ZERO; 3], depth: ZERO };
-        Self { blocks: [[block; BLOCKS]; TILE_HEIGHT], live: [0; TILE_HEIGHT] }
+        Self { blocks: [block; BLOCKS * TILE_HEIGHT], live: [0; TILE_HEIGHT + 8] }
     }
 
     /// Nothing drawn yet. Pixels outside the picture count as finished.
     pub(super) fn clear(&mut self, planes: &Planes, x0: usize) {
         let (rows, columns) = (planes.rows(), planes.columns(x0));
-        for (r, row) in self.blocks.iter_mut().enumerate() {
+        for (r, row) in self.blocks.chunks_exact_mut(BLOCKS).enumerate() {
             let mut live = 0;
             for (b, block) in row.iter_mut().enumerate() {
                 let inside = if r < rows { columns.saturating_sub(b * BLOCK).min(BLOCK) } else { 0 };
@@ -74,13 +76,19 @@ impl Tile {
         }
     }
 
+    /// Whether a pixel is not finished.
+    #[inline(always)]
+    pub(super) fn is_live(&self) -> bool {
+        self.live != [0; TILE_HEIGHT + 8]
+    }
+
     /// Takes up where an earlier slice of the depth order left off (see [`Tile::store_unfinished`]).
     pub(super) fn load(&mut self, planes: &Planes, x0: usize) {
         self.clear(planes, x0);
         for r in 0..planes.rows() {
             let start = r * planes.width + x0;
             for x in 0..planes.columns(x0) {
-                let block = &mut self.blocks[r][x / BLOCK];
+                let block = &mut self.blocks[r * BLOCKS + x / BLOCK];
                 let l = x % BLOCK;
                 lanes_mut(&mut block.transmittance)[l] = planes.alpha[start + x];
                 for c in 0..3 {
@@ -89,7 +97,8 @@ impl Tile {
                 lanes_mut(&mut block.depth)[l] = planes.depth[start + x];
             }
             for b in 0..BLOCKS {
-                let finished = lanes(&self.blocks[r][b].transmittance).iter().all(|t| t.is_sign_negative());
+                let finished =
+                    lanes(&self.blocks[r * BLOCKS + b].transmittance).iter().all(|t| t.is_sign_negative());
                 if finished {
                     self.live[r] &= !(1 << b);
                 }
@@ -136,7 +145,7 @@ impl Tile {
             let alpha = &mut planes.alpha[start..start + columns];
             let depth = &mut planes.depth[start..start + columns];
             let out = color.chunks_mut(BLOCK).zip(alpha.chunks_mut(BLOCK)).zip(depth.chunks_mut(BLOCK));
-            for (block, ((color, alpha), depth)) in self.blocks[r].iter().zip(out) {
+            for (block, ((color, alpha), depth)) in self.blocks[r * BLOCKS..].iter().zip(out) {
                 let t = lanes(&block.transmittance);
                 let [red, green, blue] = [0, 1, 2].map(|c| lanes(&block.color[c]));
                 let z = lanes(&block.depth);
