@@ -1,6 +1,7 @@
 //! What a command leaves behind: text to print, or a failure with its exit code.
 
 use std::io::Write;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Exit code of a job that failed: bad data, or a file that cannot be read or written.
 pub(crate) const FAILED: u8 = 1;
@@ -48,8 +49,37 @@ impl From<vg::Error> for Failure {
     }
 }
 
-/// One line on standard error: `vg: <what>: <message>`.
-pub(crate) fn complain(what: &str, message: &str) {
+/// What looks like a mistake, kept until it is known how the job ends.
+static NOTES: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+/// Notes something that is legal but looks like a mistake, once.
+pub(crate) fn note(text: &str) {
+    let mut notes = notes();
+    if !notes.iter().any(|known| known == text) {
+        notes.push(text.to_owned());
+    }
+}
+
+fn notes() -> MutexGuard<'static, Vec<String>> {
+    NOTES.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The notes so far as warnings, a line each: for a job that went well.
+pub(crate) fn warn() {
+    notes().drain(..).for_each(|note| line("warning", &note));
+}
+
+/// Why a job failed, in one line. What was noted before may be the reason behind the reason.
+pub(crate) fn complain(message: &str) {
+    let noted: Vec<String> = notes().drain(..).collect();
+    match noted.as_slice() {
+        [] => line("error", message),
+        noted => line("error", &format!("{message} (noted before: {})", noted.join("; "))),
+    }
+}
+
+/// `vg: <what>: <message>` on standard error.
+fn line(what: &str, message: &str) {
     // File names may hold line breaks and terminal commands.
     let line: String = message
         .chars()

@@ -35,11 +35,14 @@ fn main() -> ExitCode {
         Command::Demo(args) => demo::run(args),
         Command::Align(args) => align::run(args),
     };
+    if outcome.is_ok() {
+        job::warn();
+    }
     match outcome.and_then(|outcome| job::print(&outcome)) {
         Ok(Outcome { complete: true, .. }) => ExitCode::SUCCESS,
         Ok(_) => ExitCode::from(job::FAILED),
         Err(failure) => {
-            job::complain("error", &failure.message);
+            job::complain(&failure.message);
             ExitCode::from(failure.code)
         }
     }
@@ -61,7 +64,7 @@ fn usage(error: &clap::Error) -> ExitCode {
             ExitCode::from(job::USAGE)
         }
         _ => {
-            job::complain("error", &one_line(&text));
+            job::complain(&one_line(&text));
             ExitCode::from(job::USAGE)
         }
     }

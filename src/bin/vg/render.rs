@@ -1,7 +1,7 @@
 //! `vg render`: a model as a scene's cameras see it, or from all around.
 
 use crate::args::RenderArgs;
-use crate::job::{Failure, Outcome, Result, complain};
+use crate::job::{self, Failure, Outcome, Result};
 use crate::shown::Bar;
 use crate::{files, scene};
 use glam::{DMat3, DVec3};
@@ -54,7 +54,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result {
             let beyond = image::write_depth16(&depths[i], drawn.width, drawn.height, &drawn.depth)?;
             if beyond > 0 {
                 let path = depths[i].display();
-                complain("warning", &format!("{path}: {beyond} pixels lie beyond 65.535 m and hold none"));
+                job::note(&format!("{path}: {beyond} pixels lie beyond 65.535 m and hold none"));
             }
         }
         bar.advance();

@@ -1,7 +1,7 @@
 //! Opens scenes as the command line describes them.
 
 use crate::args::FrameArgs;
-use crate::job::{Result, complain};
+use crate::job::{self, Result};
 use std::path::{Path, PathBuf};
 use vg::io::{SceneFiles, SceneIndex, SceneOptions};
 
@@ -34,6 +34,6 @@ pub(crate) fn files_of(index: &SceneIndex) -> Vec<PathBuf> {
 /// Reads the pixels of listed views, and says what looks like a mistake.
 pub(crate) fn load(index: SceneIndex) -> Result<SceneFiles> {
     let files = index.load()?;
-    files.notes.iter().for_each(|note| complain("warning", note));
+    files.notes.iter().for_each(|note| job::note(note));
     Ok(files)
 }

@@ -5,7 +5,7 @@ pub(crate) mod split;
 mod table;
 
 use crate::args::EvalArgs;
-use crate::job::{Outcome, Result, complain};
+use crate::job::{self, Outcome, Result};
 use crate::{files, scene};
 use measure::Measured;
 use serde::Serialize;
@@ -51,11 +51,11 @@ pub(crate) fn run(args: &EvalArgs) -> Result {
         match one(path, args, &settings, |split, measured| {
             rows.push(Row { scene: name.clone(), split: split.to_owned(), measured });
         }) {
-            Ok(()) => {}
+            Ok(()) => job::warn(),
             // One scene alone is the job itself.
             Err(failure) if args.scenes.len() == 1 => return Err(failure),
             Err(failure) => {
-                complain("error", &format!("{shown}: {}", failure.message));
+                job::complain(&format!("{shown}: {}", failure.message));
                 errors.push(Broken { scene: shown, error: failure.message });
             }
         }
