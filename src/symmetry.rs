@@ -56,12 +56,12 @@ pub enum MirroredPlace {
     SeenBetter,
 }
 
-/// Completes the vehicle. `mirrored_place(index)` is asked in `Auto` only.
+/// Completes the vehicle. `mirrored_places` tells one verdict per Gaussian; asked in `Auto` only.
 pub fn complete(
     gaussians: Gaussians,
     mode: SymmetryMode,
     cameras: &[Camera],
-    mirrored_place: impl Fn(usize) -> MirroredPlace + Sync,
+    mirrored_places: impl FnOnce(&Gaussians) -> Vec<MirroredPlace>,
 ) -> (Gaussians, Completion) {
     let reference_side = reference_side(&gaussians, cameras);
     let n = gaussians.len();
@@ -78,8 +78,7 @@ pub fn complete(
             reference
         }
         SymmetryMode::Auto => {
-            use rayon::prelude::*;
-            let places: Vec<_> = (0..n).into_par_iter().map(&mirrored_place).collect();
+            let places = mirrored_places(&gaussians);
             let flags =
                 |f: &dyn Fn(MirroredPlace) -> bool| -> Vec<bool> { places.iter().map(|p| f(*p)).collect() };
             let missing = gaussians.filtered(&flags(&|place| place == MirroredPlace::Unseen));
@@ -138,7 +137,7 @@ mod tests {
 
     #[test]
     fn always_keeps_the_denser_side_and_replaces_the_other_by_its_mirror_image() {
-        let (g, done) = complete(at(&[-1.0, -0.5, 0.7, 0.0]), SymmetryMode::Always, &[], |_| Seen);
+        let (g, done) = complete(at(&[-1.0, -0.5, 0.7, 0.0]), SymmetryMode::Always, &[], |_| vec![]);
         assert_eq!(ys(&g), [-1.0, -0.5, 0.0, 1.0, 0.5, -0.0]);
         assert_eq!((done.reference_side, done.cloned, done.replaced), (Side::Right, 3, 1));
     }
@@ -148,7 +147,8 @@ mod tests {
         let i = Intrinsics { fx: 1.0, fy: 1.0, cx: 0.5, cy: 0.5 };
         let pose = Pose { translation: glam::DVec3::new(0.0, -5.0, 0.0), ..Pose::IDENTITY };
         let right = Camera::pinhole(1, 1, i, pose).unwrap();
-        let side = |cameras: &[Camera]| complete(at(&[-1.0, 1.0]), SymmetryMode::Always, cameras, |_| Seen).1;
+        let side =
+            |cameras: &[Camera]| complete(at(&[-1.0, 1.0]), SymmetryMode::Always, cameras, |_| vec![]).1;
         assert_eq!(side(&[right]).reference_side, Side::Right);
         assert_eq!(side(&[]).reference_side, Side::Left);
     }
@@ -156,7 +156,7 @@ mod tests {
     #[test]
     fn auto_clones_what_was_not_seen_across_and_drops_what_was_seen_better_there() {
         let places = [Unseen, Seen, SeenBetter, Seen];
-        let (g, done) = complete(at(&[-1.0, -0.5, 0.9, 0.5]), SymmetryMode::Auto, &[], |i| places[i]);
+        let (g, done) = complete(at(&[-1.0, -0.5, 0.9, 0.5]), SymmetryMode::Auto, &[], |_| places.to_vec());
         assert_eq!(ys(&g), [-1.0, -0.5, 0.5, 1.0]);
         assert_eq!((done.cloned, done.replaced, done.not_needed), (1, 1, 2));
     }
@@ -164,6 +164,6 @@ mod tests {
     #[test]
     fn never_changes_nothing() {
         let g = at(&[-1.0, 0.2]);
-        assert_eq!(complete(g.clone(), SymmetryMode::Never, &[], |_| Unseen).0, g);
+        assert_eq!(complete(g.clone(), SymmetryMode::Never, &[], |_| vec![]).0, g);
     }
 }

@@ -15,6 +15,7 @@ use crate::scene::visibility::{Observer, Sight};
 use crate::scene::{Scene, View, undistort};
 use crate::symmetry::{self, MirroredPlace, SymmetryMode};
 use glam::{Quat, Vec3};
+use rayon::prelude::*;
 
 /// A finished reconstruction.
 #[derive(Clone, Debug)]
@@ -110,7 +111,6 @@ pub fn reconstruct<'a>(
 }
 
 fn undistorted(scene: &Scene, used: &[usize], context: &Context) -> Result<Vec<View>> {
-    use rayon::prelude::*;
     context.parallel(|| used.par_iter().map(|&i| undistort::undistorted(&scene.views[i])).collect())
 }
 
@@ -153,28 +153,25 @@ fn complete(
     let observers: Vec<Observer> =
         views.iter().zip(&geometry.depths).map(|(v, d)| Observer::new(v, d)).collect();
     let cameras: Vec<_> = views.iter().map(|v| v.camera).collect();
-    // Moved out because `gaussians` goes where the closure cannot follow.
-    let places: Vec<(Vec3, Vec3, f32)> = match mode {
-        SymmetryMode::Auto => (0..gaussians.len()).map(|i| mirrored_place(&gaussians, i)).collect(),
-        _ => Vec::new(),
-    };
-    symmetry::complete(gaussians, mode, &cameras, |i| {
-        let (place, normal, own) = places[i];
+    let verdict = |gaussians: &Gaussians, i: usize| {
+        let (place, normal, own) = mirrored_place(gaussians, i);
         let mut mirrored = MirroredPlace::Unseen;
         for observer in &observers {
-            let resolution = match observer.sight(place, SURFACE_M) {
-                Sight::Surface { .. } => observer.resolution(place, normal),
-                Sight::Through => own,
-                Sight::Background | Sight::Silent => 0.0,
-            };
-            if resolution > MUCH_BETTER * own {
-                return MirroredPlace::SeenBetter;
+            // Most views look at the other side: they need no look-up.
+            let resolution = observer.resolution(place, normal);
+            if resolution <= own / MUCH_BETTER {
+                continue;
             }
-            if resolution > own / MUCH_BETTER {
-                mirrored = MirroredPlace::Seen;
+            match observer.sight(place, SURFACE_M) {
+                Sight::Surface { .. } if resolution > MUCH_BETTER * own => return MirroredPlace::SeenBetter,
+                Sight::Surface { .. } | Sight::Through => mirrored = MirroredPlace::Seen,
+                Sight::Background | Sight::Silent => {}
             }
         }
         mirrored
+    };
+    symmetry::complete(gaussians, mode, &cameras, |gaussians| {
+        (0..gaussians.len()).into_par_iter().map(|i| verdict(gaussians, i)).collect()
     })
 }
 
