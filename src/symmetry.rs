@@ -69,7 +69,9 @@ pub fn complete(
     let complete = match mode {
         SymmetryMode::Never => gaussians,
         SymmetryMode::Always => {
-            let mut reference = gaussians.filtered(|i| belongs(gaussians.means()[i][1], reference_side));
+            let mut reference = gaussians;
+            let keep: Vec<bool> = reference.means().iter().map(|m| belongs(m[1], reference_side)).collect();
+            reference.retain(&keep);
             done.cloned = reference.len();
             done.replaced = n - reference.len();
             reference.append_mirrored();
@@ -78,8 +80,11 @@ pub fn complete(
         SymmetryMode::Auto => {
             use rayon::prelude::*;
             let places: Vec<_> = (0..n).into_par_iter().map(&mirrored_place).collect();
-            let missing = gaussians.filtered(|i| places[i] == MirroredPlace::Unseen);
-            let mut all = gaussians.filtered(|i| places[i] != MirroredPlace::SeenBetter);
+            let flags =
+                |f: &dyn Fn(MirroredPlace) -> bool| -> Vec<bool> { places.iter().map(|p| f(*p)).collect() };
+            let missing = gaussians.filtered(&flags(&|place| place == MirroredPlace::Unseen));
+            let mut all = gaussians;
+            all.retain(&flags(&|place| place != MirroredPlace::SeenBetter));
             done.cloned = missing.len();
             done.replaced = n - all.len();
             done.not_needed = all.len() - missing.len();

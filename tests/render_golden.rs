@@ -90,7 +90,7 @@ fn cases(file: &str, npz: &Npz) -> Vec<Case> {
             out.push(Case {
                 name: format!("{file} {k:02} {name}"),
                 suffix: format!("_family_{k:02}"),
-                gaussians: all.filtered(|i| family.values[i] == k as f64),
+                gaussians: all.filtered(&family.values.iter().map(|v| *v == k as f64).collect::<Vec<bool>>()),
                 options,
             });
         }

@@ -2,6 +2,7 @@
 
 use super::sh;
 use crate::error::{Error, Result};
+use std::ops::Range;
 
 /// Smallest and largest standard deviation that is stored, metres (paper eq. `scale`).
 pub const SCALE_RANGE: std::ops::RangeInclusive<f32> = f32::MIN_POSITIVE..=1e9;
@@ -150,18 +151,34 @@ impl Gaussians {
         self.sh.extend_from_slice(&other.sh);
     }
 
-    /// Those with `keep(index)`, in order.
-    pub fn filtered(&self, keep: impl Fn(usize) -> bool) -> Self {
-        let per_gaussian = self.sh_stride();
-        let mut out = Self::with_capacity(self.sh_degree, 0);
-        for i in (0..self.len()).filter(|&i| keep(i)) {
-            out.means.push(self.means[i]);
-            out.rotations.push(self.rotations[i]);
-            out.scales.push(self.scales[i]);
-            out.opacities.push(self.opacities[i]);
-            out.sh.extend_from_slice(&self.sh[i * per_gaussian..(i + 1) * per_gaussian]);
+    /// Drops those without `keep[index]`, in place, keeping the order.
+    pub fn retain(&mut self, keep: &[bool]) {
+        assert_eq!(keep.len(), self.len(), "one flag per Gaussian");
+        let runs = runs(keep);
+        let stride = self.sh_stride();
+        rayon::join(
+            || compact(&mut self.sh, &runs, stride),
+            || {
+                compact(&mut self.means, &runs, 1);
+                compact(&mut self.rotations, &runs, 1);
+                compact(&mut self.scales, &runs, 1);
+                compact(&mut self.opacities, &runs, 1);
+            },
+        );
+    }
+
+    /// Those with `keep[index]`, in order.
+    pub fn filtered(&self, keep: &[bool]) -> Self {
+        assert_eq!(keep.len(), self.len(), "one flag per Gaussian");
+        let runs = runs(keep);
+        Self {
+            sh_degree: self.sh_degree,
+            means: gather(&self.means, &runs, 1),
+            rotations: gather(&self.rotations, &runs, 1),
+            scales: gather(&self.scales, &runs, 1),
+            opacities: gather(&self.opacities, &runs, 1),
+            sh: gather(&self.sh, &runs, self.sh_stride()),
         }
-        out
     }
 
     /// The arrays that mirroring changes: means, rotations, SH.
@@ -171,11 +188,16 @@ impl Gaussians {
 
     /// Appends a copy of all.
     pub(super) fn duplicate(&mut self) {
-        self.means.extend_from_within(..);
-        self.rotations.extend_from_within(..);
-        self.scales.extend_from_within(..);
-        self.opacities.extend_from_within(..);
-        self.sh.extend_from_within(..);
+        // Most of a Gaussian is its colour: two even halves of memory traffic.
+        rayon::join(
+            || self.sh.extend_from_within(..),
+            || {
+                self.means.extend_from_within(..);
+                self.rotations.extend_from_within(..);
+                self.scales.extend_from_within(..);
+                self.opacities.extend_from_within(..);
+            },
+        );
     }
 
     /// How many.
@@ -236,6 +258,40 @@ impl Gaussians {
     }
 }
 
+/// Maximal runs of set flags: views' pixels come row by row, so there are few.
+fn runs(keep: &[bool]) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for (i, _) in keep.iter().enumerate().filter(|(_, k)| **k) {
+        match runs.last_mut() {
+            Some(run) if run.end == i => run.end = i + 1,
+            _ => runs.push(i..i + 1),
+        }
+    }
+    runs
+}
+
+/// Moves the runs together at the front and cuts the rest off.
+fn compact<T: Copy>(values: &mut Vec<T>, runs: &[Range<usize>], stride: usize) {
+    let mut end = 0;
+    for run in runs {
+        let (start, stop) = (run.start * stride, run.end * stride);
+        if start != end {
+            values.copy_within(start..stop, end);
+        }
+        end += stop - start;
+    }
+    values.truncate(end);
+}
+
+/// The runs, one after the other.
+fn gather<T: Copy>(values: &[T], runs: &[Range<usize>], stride: usize) -> Vec<T> {
+    let mut out = Vec::with_capacity(runs.iter().map(|r| r.len() * stride).sum());
+    for run in runs {
+        out.extend_from_slice(&values[run.start * stride..run.end * stride]);
+    }
+    out
+}
+
 /// The unit quaternion along `q`, or `None` for zero or non-finite ones. In f64, where the square of no finite
 /// f32 over- or underflows.
 pub fn normalize_quaternion(q: [f32; 4]) -> Option<[f32; 4]> {
@@ -259,6 +315,25 @@ mod tests {
             assert_eq!(g.rotations()[0], [0.0, h, 0.0, -h]);
         }
         assert!(one([0.0; 4], [1.0; 3], 1.0).unwrap_err().to_string().starts_with("rotations[0]"));
+    }
+
+    #[test]
+    fn retaining_and_filtering_keep_the_same_in_order() {
+        let n = 100;
+        let sh: Vec<f32> = (0..n * 12).map(|i| i as f32).collect();
+        let means = (0..n).map(|i| [i as f32, 0.0, 0.0]).collect();
+        let unit = vec![[1.0, 0.0, 0.0, 0.0]; n];
+        let all = Gaussians::from_arrays(1, means, unit, vec![[0.1; 3]; n], vec![0.5; n], sh).unwrap();
+        let keep: Vec<bool> = (0..n).map(|i| i % 7 > 2).collect();
+        let mut retained = all.clone();
+        retained.retain(&keep);
+        assert_eq!(retained, all.filtered(&keep));
+        let expected: Vec<usize> = (0..n).filter(|&i| keep[i]).collect();
+        assert_eq!(retained.len(), expected.len());
+        for (k, &i) in expected.iter().enumerate() {
+            assert_eq!(retained.means()[k], all.means()[i]);
+            assert_eq!(retained.sh()[k * 12..][..12], all.sh()[i * 12..][..12]);
+        }
     }
 
     #[test]

@@ -11,32 +11,32 @@ use rayon::prelude::*;
 impl Gaussians {
     /// The mirror image across y = 0. Only signs change, so mirroring twice gives the same bytes.
     pub fn mirrored(&self) -> Self {
-        // Small pieces keep both cores busy; large ones keep the loop vectorised.
-        const CHUNK: usize = 1 << 13;
         let mut out = self.clone();
-        let stride = self.sh_stride();
-        let signs = sh_signs(self.sh_degree());
-        let (means, rotations, sh) = out.arrays_mut();
-        means.par_chunks_mut(CHUNK).zip(rotations.par_chunks_mut(CHUNK)).for_each(|(means, rotations)| {
-            mirror_frames(means, rotations);
-        });
-        if self.sh_degree() > 0 {
-            sh.par_chunks_mut(CHUNK * stride).for_each(|chunk| mirror_colors(chunk, &signs[..stride]));
-        }
+        out.mirror_from(0);
         out
     }
 
     /// Appends the mirror image of all Gaussians: n become 2n (G_reference U G_flip).
     pub fn append_mirrored(&mut self) {
         let n = self.len();
-        let stride = self.sh_stride();
-        let signs = sh_signs(self.sh_degree());
         self.duplicate();
-        let degree = self.sh_degree();
+        self.mirror_from(n);
+    }
+
+    /// Mirrors the Gaussians from index `start` on, in place.
+    fn mirror_from(&mut self, start: usize) {
+        // Small pieces keep all threads busy; large ones keep the loop vectorised.
+        const CHUNK: usize = 1 << 13;
+        let (degree, stride) = (self.sh_degree(), self.sh_stride());
+        let signs = sh_signs(degree);
         let (means, rotations, sh) = self.arrays_mut();
-        mirror_frames(&mut means[n..], &mut rotations[n..]);
+        let (means, rotations) = (&mut means[start..], &mut rotations[start..]);
+        means.par_chunks_mut(CHUNK).zip(rotations.par_chunks_mut(CHUNK)).for_each(|(means, rotations)| {
+            mirror_frames(means, rotations);
+        });
         if degree > 0 {
-            mirror_colors(&mut sh[n * stride..], &signs[..stride]);
+            let sh = &mut sh[start * stride..];
+            sh.par_chunks_mut(CHUNK * stride).for_each(|chunk| mirror_colors(chunk, &signs[..stride]));
         }
     }
 }

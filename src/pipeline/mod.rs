@@ -1,7 +1,8 @@
 //! The main job: scene in, vehicle out, with a plan of what the scene needs and a report of what was done.
 
 pub mod options;
-pub mod plan;
+mod pixels;
+mod plan;
 pub mod report;
 pub mod run;
 

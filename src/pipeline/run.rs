@@ -1,8 +1,8 @@
 //! The run: plan -> undistort -> prior -> pixels -> head -> symmetry -> check.
 
 use super::options::{Options, PriorChoice};
-use super::plan;
 use super::report::{Clock, InputError, Report, peak_rss_bytes};
+use super::{pixels, plan};
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
 use crate::head::surfel::FOOTPRINT_SIGMA_PX;
@@ -63,7 +63,7 @@ pub fn reconstruct<'a>(
     clock.lap("prior");
 
     context.report("pixels", 0.0)?;
-    let kept = context.parallel(|| plan::pixels(&views, &geometry, &options.keep, &mut left_out));
+    let kept = context.parallel(|| pixels::kept(&views, &geometry, &options.keep, &mut left_out));
     let points = options.points.then(|| point_cloud(&views, &geometry));
     clock.lap("pixels");
 

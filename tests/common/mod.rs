@@ -3,6 +3,7 @@
 
 pub mod npz;
 pub mod scenes;
+pub mod vehicle;
 
 use vg::render::Rendered;
 

@@ -1,0 +1,131 @@
+//! The hull prior on a vehicle whose shape is known.
+
+mod common;
+
+use common::vehicle::{HALF, camera, right_side, view, without_depth};
+use std::ops::ControlFlow;
+use vg::pipeline::{Options, PriorChoice, Reconstruction, reconstruct};
+use vg::prior::{DepthPrior, Geometry, HullPrior};
+use vg::progress::Context;
+use vg::scene::mask::Label;
+use vg::scene::{Mask, Scene, View};
+
+fn estimate(scene: &Scene, size: Option<[f64; 3]>) -> Geometry {
+    let mut proceed = |_| ControlFlow::Continue(());
+    let context = Context::new(2, &mut proceed).unwrap();
+    HullPrior { size }.estimate(&scene.views, &context).unwrap()
+}
+
+/// Depth of the hull minus true depth, pixel by pixel, for view i.
+fn excess(scene: &Scene, geometry: &Geometry, i: usize) -> Vec<f32> {
+    let truth = scene.views[i].depth.as_ref().unwrap();
+    let hull = &geometry.depths[i];
+    let pixels = truth.depth().iter().zip(hull.depth());
+    pixels.filter(|(t, _)| **t > 0.0).map(|(t, h)| h - t).collect()
+}
+
+#[test]
+fn every_mask_pixel_has_depth_and_the_hull_lies_in_front_of_the_surface_but_near_it() {
+    let scene = right_side(320, 240);
+    let geometry = estimate(&without_depth(scene.clone()), None);
+    for i in 0..scene.views.len() {
+        let mask = scene.views[i].mask.as_ref().unwrap();
+        for (label, depth) in mask.labels().iter().zip(geometry.depths[i].depth()) {
+            assert_eq!(*label == Label::Vehicle, *depth > 0.0);
+        }
+        let excess = excess(&scene, &geometry, i);
+        let mean = excess.iter().sum::<f32>() / excess.len() as f32;
+        let behind = excess.iter().filter(|e| **e > 0.06).count() as f32 / excess.len() as f32;
+        assert!((-0.2..0.02).contains(&mean), "view {i}: mean {mean}");
+        // At the rim the hull touches the surface and a voxel may be missing.
+        assert!(behind < 0.03, "view {i}: {behind} behind the surface");
+    }
+}
+
+#[test]
+fn the_estimated_box_holds_the_vehicle_and_little_more() {
+    let scene = without_depth(right_side(320, 240));
+    let size = estimate(&scene, None).vehicle_box.unwrap().size();
+    for (k, size) in size.into_iter().enumerate() {
+        let truth = 2.0 * HALF[k];
+        assert!(size > truth - 0.05 && size < truth + 0.5, "axis {k}: {size} for {truth}");
+    }
+}
+
+#[test]
+fn a_given_box_narrows_the_hull_and_is_reported_as_given() {
+    let scene = right_side(320, 240);
+    let tight = estimate(&scene, Some([4.4, 1.8, 1.4]));
+    let mean = |geometry: &Geometry| -> f32 {
+        let all: Vec<f32> = (0..4).flat_map(|i| excess(&scene, geometry, i)).map(f32::abs).collect();
+        all.iter().sum::<f32>() / all.len() as f32
+    };
+    let loose = estimate(&scene, None);
+    assert!(mean(&tight) < mean(&loose) + 1e-3, "{} against {}", mean(&tight), mean(&loose));
+    let report = run(&without_depth(scene), Some([4.4, 1.8, 1.4])).report;
+    assert_eq!(serde_json::to_value(&report).unwrap()["box"]["source"], "given");
+}
+
+fn run(scene: &Scene, vehicle_size: Option<[f64; 3]>) -> Reconstruction {
+    let options = Options { prior: PriorChoice::Hull, vehicle_size, ..Options::default() };
+    reconstruct(scene, &options, &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+/// The view with everything left of column `from` cut off, as if the camera's picture began there.
+fn cropped(view: &View, from: u32) -> View {
+    let (w, h) = (view.camera.width - from, view.camera.height);
+    let columns = |v: u32| (from..view.camera.width).map(move |u| (v * view.camera.width + u) as usize);
+    let index: Vec<usize> = (0..h).flat_map(columns).collect();
+    let mut camera = view.camera;
+    camera.width = w;
+    camera.intrinsics.cx -= f64::from(from);
+    let pixels = index.iter().map(|&i| view.image.pixels()[i]).collect();
+    let labels = index.iter().map(|&i| view.mask.as_ref().unwrap().labels()[i]).collect();
+    View {
+        camera,
+        image: vg::scene::RgbImage::new(w, h, pixels).unwrap(),
+        mask: Some(Mask::new(w, h, labels).unwrap()),
+        depth: None,
+        ..view.clone()
+    }
+}
+
+#[test]
+fn a_mask_cut_by_the_border_carves_nothing_beyond_it() {
+    let mut scene = without_depth(right_side(320, 240));
+    let whole = estimate(&scene, None).vehicle_box.unwrap();
+    let [u0, _, u1, _] = scene.views[1].mask.as_ref().unwrap().bounds().unwrap();
+    scene.views[1] = cropped(&scene.views[1], (u0 + u1) / 2);
+    let cut = estimate(&scene, None);
+    let cut_box = cut.vehicle_box.unwrap();
+    for k in 0..3 {
+        assert!(cut_box.size()[k] > whole.size()[k] - 0.1, "axis {k} lost: {:?} {:?}", cut_box, whole);
+    }
+    // The other views still find a surface under every pixel, about where it was.
+    for i in [0, 2, 3] {
+        let mask = scene.views[i].mask.as_ref().unwrap();
+        let filled = mask
+            .labels()
+            .iter()
+            .zip(cut.depths[i].depth())
+            .all(|(l, d)| (*l == Label::Vehicle) == (*d > 0.0));
+        assert!(filled, "view {i}");
+    }
+}
+
+#[test]
+fn one_side_view_alone_gets_a_plausible_width() {
+    let scene = Scene { views: vec![view("side", camera(-90.0, 6.5, 320, 240))] };
+    let size = estimate(&without_depth(scene), None).vehicle_box.unwrap().size();
+    assert!(size[1] > 1.5 && size[1] < 2.6, "{size:?}");
+}
+
+#[test]
+fn silhouettes_that_meet_nowhere_are_an_error_that_says_what_to_check() {
+    let mut scene = without_depth(right_side(160, 120));
+    // The third camera looks away from the vehicle.
+    scene.views[2].camera.vehicle_from_camera.translation.x += 40.0;
+    let error = reconstruct(&scene, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap_err();
+    let text = error.to_string();
+    assert!(text.contains("silhouettes") && text.contains("poses"), "{text}");
+}
