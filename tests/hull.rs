@@ -99,7 +99,7 @@ fn a_mask_cut_by_the_border_carves_nothing_beyond_it() {
     let cut = estimate(&scene, None);
     let cut_box = cut.vehicle_box.unwrap();
     for k in 0..3 {
-        assert!(cut_box.size()[k] > whole.size()[k] - 0.1, "axis {k} lost: {:?} {:?}", cut_box, whole);
+        assert!(cut_box.size()[k] > whole.size()[k] - 0.1, "axis {k} lost: {cut_box:?} {whole:?}");
     }
     // The other views still find a surface under every pixel, about where it was.
     for i in [0, 2, 3] {

@@ -331,7 +331,7 @@ fn finite_input_of_any_size_gives_a_finite_picture() {
     for k in 0..all.len() {
         let one = all.filtered(&(0..all.len()).map(|i| i == k).collect::<Vec<bool>>());
         let picture = renderer.render(&one, &camera, &options()).unwrap();
-        assert!(is_finite(&picture), "{:?}", one);
+        assert!(is_finite(&picture), "{one:?}");
     }
 }
 
