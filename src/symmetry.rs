@@ -79,15 +79,14 @@ pub fn complete(
         }
         SymmetryMode::Auto => {
             let places = mirrored_places(&gaussians);
-            let flags =
-                |f: &dyn Fn(MirroredPlace) -> bool| -> Vec<bool> { places.iter().map(|p| f(*p)).collect() };
-            let missing = gaussians.filtered(&flags(&|place| place == MirroredPlace::Unseen));
             let mut all = gaussians;
-            all.retain(&flags(&|place| place != MirroredPlace::SeenBetter));
-            done.cloned = missing.len();
+            all.retain(&places.iter().map(|p| *p != MirroredPlace::SeenBetter).collect::<Vec<_>>());
+            let stayed = places.iter().filter(|p| **p != MirroredPlace::SeenBetter);
+            let missing: Vec<bool> = stayed.map(|p| *p == MirroredPlace::Unseen).collect();
             done.replaced = n - all.len();
-            done.not_needed = all.len() - missing.len();
-            all.append(&missing.mirrored());
+            done.cloned = missing.iter().filter(|m| **m).count();
+            done.not_needed = all.len() - done.cloned;
+            all.append_mirrored_of(&missing);
             all
         }
     };

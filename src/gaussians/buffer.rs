@@ -186,16 +186,19 @@ impl Gaussians {
         (&mut self.means, &mut self.rotations, &mut self.sh)
     }
 
-    /// Appends a copy of all.
-    pub(super) fn duplicate(&mut self) {
+    /// Appends a copy of those with `which[index]`, in order.
+    pub(super) fn append_copies(&mut self, which: &[bool]) {
+        assert_eq!(which.len(), self.len(), "one flag per Gaussian");
+        let runs = runs(which);
+        let stride = self.sh_stride();
         // Most of a Gaussian is its colour: two even halves of memory traffic.
         rayon::join(
-            || self.sh.extend_from_within(..),
+            || append_runs(&mut self.sh, &runs, stride),
             || {
-                self.means.extend_from_within(..);
-                self.rotations.extend_from_within(..);
-                self.scales.extend_from_within(..);
-                self.opacities.extend_from_within(..);
+                append_runs(&mut self.means, &runs, 1);
+                append_runs(&mut self.rotations, &runs, 1);
+                append_runs(&mut self.scales, &runs, 1);
+                append_runs(&mut self.opacities, &runs, 1);
             },
         );
     }
@@ -281,6 +284,14 @@ fn compact<T: Copy>(values: &mut Vec<T>, runs: &[Range<usize>], stride: usize) {
         end += stop - start;
     }
     values.truncate(end);
+}
+
+/// Copies the runs to the end.
+fn append_runs<T: Copy>(values: &mut Vec<T>, runs: &[Range<usize>], stride: usize) {
+    values.reserve(runs.iter().map(|r| r.len() * stride).sum());
+    for run in runs {
+        values.extend_from_within(run.start * stride..run.end * stride);
+    }
 }
 
 /// The runs, one after the other.

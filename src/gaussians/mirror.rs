@@ -18,8 +18,13 @@ impl Gaussians {
 
     /// Appends the mirror image of all Gaussians: n become 2n (G_reference U G_flip).
     pub fn append_mirrored(&mut self) {
+        self.append_mirrored_of(&vec![true; self.len()]);
+    }
+
+    /// Appends the mirror images of those with `which[index]`, in order.
+    pub fn append_mirrored_of(&mut self, which: &[bool]) {
         let n = self.len();
-        self.duplicate();
+        self.append_copies(which);
         self.mirror_from(n);
     }
 
