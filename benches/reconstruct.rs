@@ -3,28 +3,21 @@
 //! `cargo bench --bench reconstruct` prints one row per depth source and number of threads: medians over the runs,
 //! what part of the whole the cloning takes, and the highest memory of the process during these runs.
 
-use std::ops::ControlFlow;
-use std::path::Path;
-use vg::io::{SceneOptions, open_scene};
-use vg::metrics::ViewErrors;
-use vg::pipeline::{Options, PriorChoice, Reconstruction, Report, reconstruct};
-use vg::render::{CpuRenderer, RenderOptions, Renderer};
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use common::sample::{self, INPUTS, UNSEEN, errors, median, run};
+use vg::pipeline::{Options, PriorChoice, Report};
 use vg::{Result, Scene};
 
 /// Timed runs of each setting, after one that is not timed.
 const RUNS: usize = 7;
 
 fn main() -> Result<()> {
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/sedan");
-    let open = |names: [&str; 4], load_depth: bool| {
-        let views = Some(names.map(String::from).to_vec());
-        open_scene(&scene, &SceneOptions { views, load_depth, ..SceneOptions::default() }).map(|s| s.scene)
-    };
-    let (inputs, blind) = (["000", "001", "002", "003"], false);
-    let tests = open(["004", "005", "006", "007"], blind)?;
+    let tests = sample::open(&UNSEEN, false)?;
     println!("{RUNS} runs each, medians in ms; errors on the four unseen views of the other side\n");
     for prior in [PriorChoice::Hull, PriorChoice::Given] {
-        let scene = open(inputs, prior == PriorChoice::Given)?;
+        let scene = sample::open(&INPUTS, prior == PriorChoice::Given)?;
         for threads in [1, 2] {
             row(&scene, &tests, &Options { prior, threads, ..Options::default() })?;
         }
@@ -65,29 +58,6 @@ fn row(scene: &Scene, tests: &Scene, options: &Options) -> Result<()> {
         100.0 * cloning / (total - of("check")),
     );
     Ok(())
-}
-
-fn run(scene: &Scene, options: &Options) -> Result<Reconstruction> {
-    reconstruct(scene, options, &mut |_| ControlFlow::Continue(()))
-}
-
-fn errors(made: &Reconstruction, tests: &Scene) -> Result<ViewErrors> {
-    let renderer = CpuRenderer::new();
-    let errors: Vec<ViewErrors> = tests
-        .views
-        .iter()
-        .map(|view| {
-            let drawn = renderer.render(&made.gaussians, &view.camera, &RenderOptions::default())?;
-            Ok(ViewErrors::of(&drawn, view))
-        })
-        .collect::<Result<_>>()?;
-    Ok(ViewErrors::mean(&errors).expect("four views"))
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 /// Linux forgets the highest memory so far when asked; elsewhere the rows show the highest of all so far.

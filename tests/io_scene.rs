@@ -1,5 +1,7 @@
 //! Scenes on disk: the bundled sedan by both of its descriptions, and small scenes made here.
 
+mod common;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use vg::io::image::{write_depth16, write_mask, write_rgb8, write_rgba8};
@@ -219,7 +221,7 @@ fn the_shared_scenes_open_by_both_descriptions() {
     let root = std::env::var_os("VG_SHARED_DATA")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
     if !root.join("carset").is_dir() {
-        println!("skipped: {} has no carset (VG_SHARED_DATA says where it is)", root.display());
+        common::say(&format!("skipped: {} has no carset (VG_SHARED_DATA says where it is)", root.display()));
         return;
     }
     for instance in fs::read_dir(root.join("carset")).unwrap().map(|e| e.unwrap().path()) {

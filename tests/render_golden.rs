@@ -23,7 +23,10 @@ fn golden() -> Option<PathBuf> {
     if folder.join("extreme_256.npz").exists() {
         return Some(folder);
     }
-    println!("skipped: no golden renders in {}", folder.display());
+    common::say(&format!(
+        "skipped: no golden renders in {} (VG_GSPLAT_GOLDEN says where they are)",
+        folder.display()
+    ));
     None
 }
 

@@ -56,12 +56,12 @@ impl Similarity {
     /// The least-squares similarity that takes `from[i]` to `to[i]` (Umeyama 1991, eqs. 38 to 43).
     /// At least three points that are not on one line.
     pub fn umeyama(from: &[DVec3], to: &[DVec3]) -> Result<Self> {
-        if from.len() != to.len() || from.len() < 3 {
-            return Err(Error::argument(
-                "points",
-                format!("{} and {}", from.len(), to.len()),
-                "equally many, at least 3",
-            ));
+        if from.len() != to.len() {
+            let found = format!("{} to match {}", from.len(), to.len());
+            return Err(Error::argument("points", found, "equally many"));
+        }
+        if from.len() < 3 {
+            return Err(Error::argument("points", format!("{} pairs", from.len()), "at least 3 pairs"));
         }
         if from.iter().chain(to).any(|p| !p.is_finite()) {
             return Err(Error::argument("points", "a NaN or infinite coordinate", "finite numbers"));

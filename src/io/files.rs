@@ -59,7 +59,7 @@ pub(crate) fn in_file(path: &Path, error: Error) -> Error {
 
 /// Writes `path` by way of a temporary file in the same folder that replaces it at the end: when anything
 /// fails, what was there before is still there. Devices and pipes are written to directly.
-pub(crate) fn write_atomically(
+pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> Result<()> {

@@ -45,6 +45,8 @@ pub struct Options {
     pub sh_degree: u8,
     /// What the plan may not leave out.
     pub keep: Keep,
+    /// Whether to draw the model into its input views and report the error there.
+    pub check: bool,
     /// Worker threads; 0 means one per core.
     pub threads: usize,
     /// Whether to return the metric coloured point cloud as well.
@@ -59,6 +61,7 @@ impl Default for Options {
             vehicle_size: None,
             sh_degree: 2,
             keep: Keep::default(),
+            check: true,
             threads: 0,
             points: false,
         }

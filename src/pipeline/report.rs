@@ -84,8 +84,8 @@ pub struct Report {
     pub left_out: Vec<LeftOut>,
     /// How the unseen side was completed.
     pub symmetry: Completion,
-    /// Error on the input views.
-    pub input_error: InputError,
+    /// Error on the input views, unless the check was switched off.
+    pub input_error: Option<InputError>,
     /// The options of the call.
     pub settings: Options,
 }

@@ -80,6 +80,7 @@ impl MethodArgs {
                 floaters: kept(KeepItem::Floaters),
                 sh_bands: kept(KeepItem::ShBands),
             },
+            check: true,
             threads: self.threads,
             points: false,
         }
@@ -128,6 +129,9 @@ pub(crate) struct ReconstructArgs {
     /// Write the metric coloured point cloud as well
     #[arg(long, value_name = "P.ply")]
     pub(crate) points: Option<PathBuf>,
+    /// Do not draw the model into the input views to report the error there: about twice as fast with given depth
+    #[arg(long)]
+    pub(crate) no_check: bool,
     /// Write what was done: settings, stage times, counts, what was left out and why, errors
     #[arg(long, value_name = "R.json")]
     pub(crate) report: Option<PathBuf>,

@@ -2,7 +2,6 @@
 
 use crate::job::{Failure, Result};
 use std::collections::HashMap;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Makes sure that the file's folder exists and takes files, and that the file is no folder, before work is spent
@@ -63,21 +62,7 @@ pub(crate) fn refuse_clashes(outputs: &[PathBuf], inputs: &[PathBuf]) -> Result<
 
 /// Writes a file by way of a temporary one beside it, so that nobody meets half of it.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    let failed = |e: std::io::Error| Failure::job(format!("{}: {}", path.display(), cause(&e)));
-    // A device or a pipe (--report /dev/stderr) is written to as it is.
-    if std::fs::metadata(path).is_ok_and(|meta| !meta.is_file()) {
-        return std::fs::write(path, bytes).map_err(failed);
-    }
-    let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".vg-").suffix(".part");
-    // Temporary files are private by default; this one becomes an ordinary file.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder_of(&target)).map_err(failed)?;
-    file.write_all(bytes).map_err(failed)?;
-    file.persist(&target).map_err(|e| failed(e.error))?;
-    Ok(())
+    Ok(vg::io::write_atomically(path, |out| out.write_all(bytes))?)
 }
 
 /// Writes a value as indented JSON.

@@ -23,7 +23,7 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
     outputs.iter().try_for_each(|path| files::prepare(path))?;
 
     let opened = scene::load(index)?;
-    let settings = Options { points: args.points.is_some(), ..args.method.options() };
+    let settings = Options { points: args.points.is_some(), check: !args.no_check, ..args.method.options() };
     let made = reconstruct(&opened.scene, &settings)?;
 
     ply::write(&args.output, &made.gaussians)?;
@@ -46,14 +46,15 @@ pub(crate) fn reconstruct(scene: &Scene, options: &Options) -> Result<Reconstruc
 pub(crate) fn summary(made: &Reconstruction) -> String {
     let report = &made.report;
     let extent = report.extent_m.as_ref().map_or_else(String::new, |e| format!("{}, ", shown::extent(e)));
+    let check = report.input_error.map_or_else(String::new, |e| {
+        format!("; on these views PSNR {:.2} dB, silhouette IoU {:.3}", e.psnr_db, e.silhouette_iou)
+    });
     format!(
-        "{} Gaussians, {extent}SH degree {}, prior {}, {} views, {:.2} s; on these views PSNR {:.2} dB, silhouette IoU {:.3}",
+        "{} Gaussians, {extent}SH degree {}, prior {}, {} views, {:.2} s{check}",
         shown::count(report.gaussians),
         report.sh_degree,
         report.prior,
         report.views_used.len(),
         report.total_ms / 1e3,
-        report.input_error.psnr_db,
-        report.input_error.silhouette_iou,
     )
 }
