@@ -608,7 +608,9 @@ fn scenes_on_disk() {
         vehicle_frame::parse_known_centers(br#"{"a.png": [1, 2]}"#, Path::new("k.json"))
     });
     let known = [("a.png".to_owned(), DVec3::ZERO)];
-    table.row("one centre", &["points: 1 and 1"], || vehicle_frame::vehicle_from_known_centers(root, &known));
+    table.row("one centre", &["points: 1 in each list"], || {
+        vehicle_frame::vehicle_from_known_centers(root, &known)
+    });
     table.finish(35);
 }
 
@@ -669,7 +671,7 @@ fn arguments() {
         let line = [DVec3::ZERO, DVec3::X, DVec3::X * 2.0];
         Similarity::umeyama(&line, &line)
     });
-    table.row("lists of two lengths", &["points: 3 and 4"], || {
+    table.row("lists of two lengths", &["points: 3 to match 4"], || {
         Similarity::umeyama(&[DVec3::X, DVec3::Y, DVec3::Z], &[DVec3::ZERO; 4])
     });
     table.row("a NaN point", &["points: a NaN"], || {

@@ -61,7 +61,7 @@ impl Similarity {
             return Err(Error::argument("points", found, "equally many"));
         }
         if from.len() < 3 {
-            return Err(Error::argument("points", format!("{} pairs", from.len()), "at least 3 pairs"));
+            return Err(Error::argument("points", format!("{} in each list", from.len()), "at least 3"));
         }
         if from.iter().chain(to).any(|p| !p.is_finite()) {
             return Err(Error::argument("points", "a NaN or infinite coordinate", "finite numbers"));

@@ -3,12 +3,21 @@
 use super::options::{Keep, Options, PriorChoice};
 use super::report::LeftOut;
 use crate::error::{Error, Result};
+use crate::geometry::Camera;
+use crate::prior::Geometry;
 use crate::scene::{Scene, View};
+use glam::DVec3;
 
 /// Cameras nearer to each other than this, looking the same way, show the same.
 const SAME_CENTER_M: f64 = 1e-3;
 /// About 0.06 degrees.
 const SAME_ROTATION: f64 = 1e-3;
+
+/// Views within this see the same colour: no view dependence to hold, degrees.
+const NARROW_DEGREES: f64 = 10.0;
+
+/// Within this a linear change of colour with direction is all that can be told, degrees.
+const WIDE_DEGREES: f64 = 40.0;
 
 /// Indices of the views worth using, and what was left out.
 pub(super) fn views(scene: &Scene, keep: &Keep) -> Result<(Vec<usize>, Vec<LeftOut>)> {
@@ -37,12 +46,11 @@ pub(super) fn views(scene: &Scene, keep: &Keep) -> Result<(Vec<usize>, Vec<LeftO
 }
 
 fn same_camera(a: &View, b: &View) -> bool {
-    let (pa, pb) = (&a.camera.vehicle_from_camera, &b.camera.vehicle_from_camera);
+    let (pa, pb) = (a.camera.vehicle_from_camera, b.camera.vehicle_from_camera);
     let turned = (pa.rotation - pb.rotation).to_cols_array().iter().fold(0.0f64, |m, x| m.max(x.abs()));
     (pa.translation - pb.translation).length() < SAME_CENTER_M
         && turned < SAME_ROTATION
-        && a.camera.intrinsics == b.camera.intrinsics
-        && (a.camera.width, a.camera.height) == (b.camera.width, b.camera.height)
+        && Camera { vehicle_from_camera: pa, ..b.camera } == a.camera
 }
 
 /// The depth source for these views.
@@ -54,16 +62,23 @@ pub(super) fn prior(views: &[View], options: &Options) -> PriorChoice {
     }
 }
 
-/// The SH degree that the directions the views look from can support: none for one direction; bands of
+/// The SH degree that the directions the vehicle is seen from can support: none for one direction; bands of
 /// degree l bend over angles of about pi / l, so a narrow fan of views determines low bands only.
-pub(super) fn sh_degree(views: &[View], options: &Options, left_out: &mut Vec<LeftOut>) -> u8 {
+pub(super) fn sh_degree(
+    views: &[View],
+    geometry: &Geometry,
+    options: &Options,
+    left_out: &mut Vec<LeftOut>,
+) -> u8 {
     if options.keep.sh_bands {
         return options.sh_degree;
     }
-    let directions: Vec<_> = views.iter().map(|v| v.camera.vehicle_from_camera.rotation.z_axis).collect();
+    let middle = geometry.middle(views);
+    let directions: Vec<DVec3> =
+        views.iter().map(|v| (middle - v.camera.center()).normalize_or(DVec3::X)).collect();
     let spread = directions
         .iter()
-        .flat_map(|a| directions.iter().map(move |b| a.dot(*b).clamp(-1.0, 1.0).acos().to_degrees()))
+        .flat_map(|a| directions.iter().map(move |b| a.angle_between(*b).to_degrees()))
         .fold(0.0f64, f64::max);
     let supported = match spread {
         s if s < NARROW_DEGREES => 0,
@@ -75,12 +90,6 @@ pub(super) fn sh_degree(views: &[View], options: &Options, left_out: &mut Vec<Le
     note(left_out, "SH bands", &why, usize::from(options.sh_degree - degree));
     degree
 }
-
-/// Views within this see the same colour: no view dependence to hold, degrees.
-const NARROW_DEGREES: f64 = 10.0;
-
-/// Within this a linear change of colour with direction is all that can be told, degrees.
-const WIDE_DEGREES: f64 = 40.0;
 
 pub(super) fn note(left_out: &mut Vec<LeftOut>, what: &str, why: &str, count: usize) {
     if count > 0 {

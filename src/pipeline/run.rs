@@ -69,7 +69,7 @@ pub fn reconstruct<'a>(
     clock.lap("pixels");
 
     context.report("head", 0.0)?;
-    let head = SurfelHead::new(plan::sh_degree(&views, options, &mut left_out));
+    let head = SurfelHead::new(plan::sh_degree(&views, &geometry, options, &mut left_out));
     let gaussians = head.predict(&views, &geometry, &kept, &context)?;
     if gaussians.is_empty() {
         return Err(Error::Reconstruction {

@@ -10,7 +10,7 @@ pub use hull::HullPrior;
 use crate::error::Result;
 use crate::progress::Context;
 use crate::scene::{DepthMap, View};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// A source of metric depth.
 pub trait DepthPrior {
@@ -37,6 +37,21 @@ impl Geometry {
     /// Depth without normals yet.
     pub fn new(depths: Vec<DepthMap>, vehicle_box: Option<VehicleBox>) -> Self {
         Self { depths, normals: Vec::new(), vehicle_box }
+    }
+
+    /// About the middle of what the views see, vehicle frame, metres: the mean of some lifted pixels.
+    pub fn middle(&self, views: &[View]) -> DVec3 {
+        /// A prime, so that the samples do not line up in columns.
+        const EVERY: usize = 97;
+        let (mut sum, mut count) = (DVec3::ZERO, 0.0);
+        for (view, depth) in views.iter().zip(&self.depths) {
+            for (i, z) in depth.depth().iter().enumerate().step_by(EVERY).filter(|(_, z)| **z > 0.0) {
+                let (u, v) = (i as u32 % depth.width(), i as u32 / depth.width());
+                sum += view.lift(u, v, *z).as_dvec3();
+                count += 1.0;
+            }
+        }
+        if count > 0.0 { sum / count } else { DVec3::ZERO }
     }
 
     /// Normals from depth, where the prior gave none.
