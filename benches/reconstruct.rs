@@ -8,6 +8,7 @@ mod common;
 
 use common::sample::{self, INPUTS, UNSEEN, errors, median, run};
 use vg::pipeline::{Options, PriorChoice, Report};
+use vg::symmetry::SymmetryMode;
 use vg::{Result, Scene};
 
 /// Timed runs of each setting, after one that is not timed.
@@ -18,8 +19,10 @@ fn main() -> Result<()> {
     println!("{RUNS} runs each, medians in ms; errors on the four unseen views of the other side\n");
     for prior in [PriorChoice::Hull, PriorChoice::Given] {
         let scene = sample::open(&INPUTS, prior == PriorChoice::Given)?;
-        for threads in [1, 2] {
-            row(&scene, &tests, &Options { prior, threads, ..Options::default() })?;
+        for symmetry in [SymmetryMode::Auto, SymmetryMode::Always] {
+            for threads in [1, 2] {
+                row(&scene, &tests, &Options { prior, symmetry, threads, ..Options::default() })?;
+            }
         }
     }
     Ok(())
@@ -38,8 +41,9 @@ fn row(scene: &Scene, tests: &Scene, options: &Options) -> Result<()> {
     let memory = reports.iter().filter_map(|r| r.peak_rss_bytes).max().unwrap_or(0);
 
     println!(
-        "{} on {} thread{}: {total:.0} ms, PSNR {:.2} dB, SSIM {:.3}, IoU {:.3}, {} Gaussians, peak {:.0} MB",
+        "{}, symmetry {}, {} thread{}: {total:.0} ms, PSNR {:.2} dB, SSIM {:.3}, IoU {:.3}, {} Gaussians, peak {:.0} MB",
         first.report.prior,
+        format!("{:?}", options.symmetry).to_lowercase(),
         options.threads,
         if options.threads == 1 { "" } else { "s" },
         errors.psnr_db,

@@ -90,8 +90,7 @@ impl<'a> Observer<'a> {
     /// it is foreshortened: the resolution at which this view shows the surface. Negative from behind.
     pub fn resolution(&self, point: Vec3, normal: Vec3) -> f32 {
         let to_camera = self.center - point;
-        let distance = to_camera.length();
         let focal = self.intrinsics[0].min(self.intrinsics[1]);
-        focal * normal.dot(to_camera) / (distance * distance)
+        focal * normal.dot(to_camera) / to_camera.length_squared()
     }
 }
