@@ -9,8 +9,8 @@
 use crate::gaussians::sh;
 use glam::Vec3;
 
-/// Most views that take part in one surfel's colour; more add nothing that three bands can hold.
-pub const MAX_SAMPLES: usize = 8;
+/// Most views that take part in one surfel's colour: about as many as three bands have coefficients.
+pub const MAX_SAMPLES: usize = 16;
 
 /// Noise variance of a view of weight 1 over the prior variance of the view-dependent part.
 const NOISE: f64 = 0.3;
@@ -28,7 +28,15 @@ pub struct Sample {
 
 /// SH coefficients `[16][3]` up to `degree` that show the samples' colours in their directions.
 pub fn fit(samples: &[Sample], degree: u8) -> [f32; 48] {
-    let samples = &samples[..samples.len().min(MAX_SAMPLES)];
+    // Working memory is cleared for every surfel; few have many samples.
+    match samples.len() {
+        0..=4 => fit_up_to::<4>(samples, degree),
+        5..=8 => fit_up_to::<8>(samples, degree),
+        _ => fit_up_to::<MAX_SAMPLES>(&samples[..samples.len().min(MAX_SAMPLES)], degree),
+    }
+}
+
+fn fit_up_to<const N: usize>(samples: &[Sample], degree: u8) -> [f32; 48] {
     let mut out = [0.0f32; 48];
     let total: f32 = samples.iter().map(|s| s.weight).sum();
     if total <= 0.0 {
@@ -41,12 +49,12 @@ pub fn fit(samples: &[Sample], degree: u8) -> [f32; 48] {
     }
     let n = samples.len();
     let prior = band_variances(degree);
-    let mut basis = [[0.0f64; 16]; MAX_SAMPLES];
+    let mut basis = [[0.0f64; 16]; N];
     for (b, s) in basis.iter_mut().zip(samples) {
         *b = sh::basis(s.direction.as_dvec3().to_array(), degree);
     }
     let coefficients = sh::coefficients(degree);
-    let mut k = [[0.0f64; MAX_SAMPLES]; MAX_SAMPLES];
+    let mut k = [[0.0f64; N]; N];
     for i in 0..n {
         for j in 0..=i {
             let covariance: f64 = (1..coefficients).map(|c| prior[c] * basis[i][c] * basis[j][c]).sum();
@@ -55,7 +63,7 @@ pub fn fit(samples: &[Sample], degree: u8) -> [f32; 48] {
         }
         k[i][i] += NOISE / f64::from(samples[i].weight).max(1e-3);
     }
-    let mut residual = [[0.0f64; 3]; MAX_SAMPLES];
+    let mut residual = [[0.0f64; 3]; N];
     for (r, s) in residual.iter_mut().zip(samples) {
         *r = (s.color - mean).as_dvec3().to_array();
     }
@@ -81,7 +89,7 @@ fn band_variances(degree: u8) -> [f64; 16] {
 }
 
 /// Solves K x = b for symmetric positive definite K (Cholesky), overwriting b with x.
-fn solve_in_place(k: &mut [[f64; MAX_SAMPLES]; MAX_SAMPLES], b: &mut [[f64; 3]; MAX_SAMPLES], n: usize) {
+fn solve_in_place<const N: usize>(k: &mut [[f64; N]; N], b: &mut [[f64; 3]; N], n: usize) {
     for i in 0..n {
         for j in 0..=i {
             let sum: f64 = k[i][j] - (0..j).map(|m| k[i][m] * k[j][m]).sum::<f64>();
@@ -97,5 +105,47 @@ fn solve_in_place(k: &mut [[f64; MAX_SAMPLES]; MAX_SAMPLES], b: &mut [[f64; 3]; 
             let sum: f64 = (i + 1..n).map(|m| k[m][i] * b[m][channel]).sum();
             b[i][channel] = (b[i][channel] - sum) / k[i][i];
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(x: f32, y: f32, color: f32) -> Sample {
+        Sample { direction: Vec3::new(x, y, 0.1).normalize(), color: Vec3::splat(color), weight: 1.0 }
+    }
+
+    fn shown(sh: &[f32; 48], direction: Vec3) -> f64 {
+        sh::color(sh, direction.as_dvec3().to_array(), 3)[0]
+    }
+
+    #[test]
+    fn one_view_or_degree_zero_give_the_mean_colour_from_everywhere() {
+        let one = fit(&[sample(1.0, 0.0, 0.3)], 3);
+        let mean = fit(&[sample(1.0, 0.0, 0.2), sample(0.0, 1.0, 0.6)], 0);
+        for direction in [Vec3::X, Vec3::Y, Vec3::NEG_Z] {
+            assert!((shown(&one, direction) - 0.3).abs() < 1e-6);
+            assert!((shown(&mean, direction) - 0.4).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn each_views_colour_is_shown_near_its_direction() {
+        let samples = [sample(1.0, 0.0, 0.2), sample(0.0, 1.0, 0.6), sample(-1.0, 0.2, 0.9)];
+        let sh = fit(&samples, 3);
+        for s in &samples {
+            let color = f64::from(s.color.x);
+            let seen = shown(&sh, s.direction);
+            assert!((seen - color).abs() < 0.1, "{seen} for {color}");
+        }
+    }
+
+    #[test]
+    fn equal_directions_with_unequal_colours_and_twenty_views_stay_finite() {
+        let twice = [sample(1.0, 0.0, 0.0), sample(1.0, 0.0, 1.0)];
+        assert!((shown(&fit(&twice, 3), Vec3::X) - 0.5).abs() < 0.05);
+        let many: Vec<Sample> = (0..20).map(|i| sample(1.0, 0.01 * i as f32, (i % 2) as f32)).collect();
+        assert!(fit(&many, 3).iter().all(|v| v.is_finite() && v.abs() < 100.0));
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! In-plane it is as large as the pixel's footprint on the surface, so that its projection into its own view
 //! is a circle of [`FOOTPRINT_SIGMA_PX`] whatever the obliquity; across the surface it is thin. Its colour
-//! comes from all views that see the place (see [`super::appearance`]); with one view, degree 0 and no other
-//! view it is the pixel's own, RGB2SH(I).
+//! comes from all views that see the place (see [`super::appearance`]); where no other view sees it, it is the
+//! pixel's own, RGB2SH(I).
 
 use super::GaussianHead;
 use super::appearance::{self, Sample};
