@@ -54,14 +54,14 @@ fn the_estimated_box_holds_the_vehicle_and_little_more() {
 
 #[test]
 fn a_given_box_narrows_the_hull_and_is_reported_as_given() {
-    let scene = right_side(320, 240);
-    let tight = estimate(&scene, Some([4.4, 1.8, 1.4]));
+    // Two views of the flank bound the width loosely.
+    let scene = Scene { views: right_side(320, 240).views[1..3].to_vec() };
     let mean = |geometry: &Geometry| -> f32 {
-        let all: Vec<f32> = (0..4).flat_map(|i| excess(&scene, geometry, i)).map(f32::abs).collect();
+        let all: Vec<f32> = (0..2).flat_map(|i| excess(&scene, geometry, i)).map(f32::abs).collect();
         all.iter().sum::<f32>() / all.len() as f32
     };
-    let loose = estimate(&scene, None);
-    assert!(mean(&tight) < mean(&loose) + 1e-3, "{} against {}", mean(&tight), mean(&loose));
+    let (tight, loose) = (estimate(&scene, Some([4.4, 1.8, 1.4])), estimate(&scene, None));
+    assert!(mean(&tight) < mean(&loose) - 0.01, "{} against {}", mean(&tight), mean(&loose));
     let report = run(&without_depth(scene), Some([4.4, 1.8, 1.4])).report;
     assert_eq!(serde_json::to_value(&report).unwrap()["box"]["source"], "given");
 }

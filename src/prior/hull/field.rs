@@ -46,6 +46,27 @@ impl Field {
         Self { low, voxel, size, values }
     }
 
+    /// Replaces every value by the mean over the cube that reaches `radius` metres (rounded to grid points) to
+    /// either side, cut at the border of the grid.
+    pub(super) fn smooth(&mut self, radius: f32) {
+        let reach = (radius / self.voxel).round() as usize;
+        let [nx, ny, nz] = self.size;
+        // A mean over a cube is a mean along each axis in turn.
+        for (stride, n) in [(1, nx), (nx, ny), (nx * ny, nz)] {
+            let before = self.values.clone();
+            self.values.par_chunks_mut(nx).enumerate().for_each(|(row, values)| {
+                for (i, value) in values.iter_mut().enumerate() {
+                    let index = row * nx + i;
+                    let position = index / stride % n;
+                    let (first, last) = (position.saturating_sub(reach), (position + reach).min(n - 1));
+                    let start = index - position * stride;
+                    let sum: f32 = (first..=last).map(|k| before[start + k * stride]).sum();
+                    *value = sum / (last - first + 1) as f32;
+                }
+            });
+        }
+    }
+
     /// Grid spacing, metres.
     pub(super) fn voxel(&self) -> f32 {
         self.voxel
@@ -92,5 +113,33 @@ impl Field {
         let point =
             |ijk: [usize; 3]| (self.low + self.voxel * Vec3::from_array(ijk.map(|v| v as f32))).as_dvec3();
         bounds.map(|(low, high)| (point(low), point(high)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wedge() -> Field {
+        // Inside where x < 0 and z < 0: a crease along y.
+        Field::carve(DVec3::splat(-0.5), DVec3::splat(0.5), 0.02, |p| (-p.x).min(-p.z))
+    }
+
+    #[test]
+    fn smoothing_leaves_flat_faces_and_rounds_creases() {
+        let mut field = wedge();
+        field.smooth(0.06);
+        let face = field.sample(Vec3::new(-0.003, 0.0, -0.3));
+        assert!((face - 0.003).abs() < 1e-4, "{face}");
+        assert!(field.sample(Vec3::new(-0.005, 0.0, -0.005)) < 0.0);
+    }
+
+    #[test]
+    fn the_field_is_its_own_mirror_image() {
+        let field = Field::carve(DVec3::splat(-0.5), DVec3::splat(0.5), 0.05, |p| p.y + 0.2);
+        for y in [0.0, 0.13, 0.4] {
+            let (left, right) = (field.sample(Vec3::new(0.1, y, 0.1)), field.sample(Vec3::new(0.1, -y, 0.1)));
+            assert!((left - right).abs() < 1e-6 && (right - (0.2 - y)).abs() < 1e-3, "{left} {right}");
+        }
     }
 }

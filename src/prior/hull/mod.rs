@@ -3,7 +3,11 @@
 //! A mirrored camera sees the mirrored vehicle, and the vehicle is its own mirror image: N one-sided
 //! silhouettes carve like 2N all round. The hull is the zero level of F(p) = min over all 2N views of the
 //! signed distance from p's pixel to the silhouette's edge, in metres at p's depth. A view says nothing of
-//! points behind it or outside its picture, so a mask cut by the border carves nothing beyond it.
+//! points behind it, nor beyond a border of its picture that cuts the vehicle, so such a mask carves nothing there.
+//!
+//! Where two cones cross, the hull has a crease that the vehicle inside it has not: F is smoothed before its zero
+//! level is taken. A ray that then passes the surface by takes the depth where it comes closest to it, so that
+//! every mask is filled.
 
 mod extent;
 mod field;
@@ -24,6 +28,10 @@ const FINEST_VOXEL_M: f64 = 0.02;
 
 /// Grid points along the longest side; bounds memory at about 2 M points for a car's proportions.
 const MOST_POINTS: f64 = 224.0;
+
+/// Reach of the smoothing, metres: on ten ray-traced vehicles 0.05 gains 0.3 dB on the unseen side over none, and
+/// no more from 0.075 on, where depth begins to lose.
+const SMOOTHING_M: f32 = 0.05;
 
 /// See the module's documentation.
 #[derive(Clone, Copy, Debug, Default)]
@@ -70,12 +78,14 @@ impl HullPrior {
     }
 }
 
-/// The hull in its box, with a margin so that the surface lies inside the grid.
+/// The smoothed hull in its box, with a margin so that the surface lies inside the grid.
 fn carve(silhouettes: &[Silhouette], vehicle_box: &VehicleBox) -> Field {
     let (low, high) = (glam::DVec3::from_array(vehicle_box.low), glam::DVec3::from_array(vehicle_box.high));
     let voxel = ((high - low).max_element() / MOST_POINTS).max(FINEST_VOXEL_M);
     let margin = glam::DVec3::splat(2.0 * voxel);
-    Field::carve(low - margin, high + margin, voxel, |p| {
+    let mut field = Field::carve(low - margin, high + margin, voxel, |p| {
         inside_all(silhouettes, p).min(inside_box(vehicle_box, p))
-    })
+    });
+    field.smooth(SMOOTHING_M);
+    field
 }
