@@ -59,9 +59,9 @@ fn main() -> Result<()> {
             &[base(prior), keeping(prior, keep)],
         )?;
 
-        let narrow = Scene { views: scene.views[1..3].to_vec() };
+        let narrow = Scene { views: scene.views[1..2].to_vec() };
         let keep = Keep { sh_bands: true, ..Keep::default() };
-        let what = format!("{name}, views 001 and 002");
+        let what = format!("{name}, view 001 alone");
         row("SH bands", &what, "too few to tell", &narrow, &unseen, &[base(prior), keeping(prior, keep)])?;
 
         let around = sample::open(&["000", "001", "002", "003", "005", "007"], false)?;
