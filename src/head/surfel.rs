@@ -13,7 +13,7 @@ use crate::gaussians::{Gaussians, sh};
 use crate::prior::Geometry;
 use crate::progress::Context;
 use crate::scene::View;
-use crate::scene::visibility::{Observer, Sight};
+use crate::scene::visibility::{Observer, SURFACE_M, Sight};
 use glam::{Mat3, Quat, Vec3};
 use rayon::prelude::*;
 
@@ -33,9 +33,6 @@ const OPACITY: f32 = 0.9;
 
 /// A view that shows a place at a fraction of the resolution still tells its colour.
 const MIN_WEIGHT: f32 = 0.3;
-
-/// Views agree on a surface to about this, metres.
-const SURFACE_M: f32 = 0.06;
 
 /// See the module's documentation.
 #[derive(Clone, Copy, Debug, Default)]
@@ -65,8 +62,7 @@ impl GaussianHead for SurfelHead {
         let count = kept.iter().flatten().filter(|k| **k).count();
         let mut all = Gaussians::with_capacity(self.sh_degree, count);
         let coefficients = all.sh_stride();
-        let observers: Vec<Observer> =
-            views.iter().zip(&geometry.depths).map(|(v, d)| Observer::new(v, d)).collect();
+        let observers = geometry.observers(views);
         for (i, view) in views.iter().enumerate() {
             let surfels: Vec<(Gaussian, [f32; 48])> = context.parallel(|| {
                 (0..kept[i].len())
@@ -105,7 +101,7 @@ impl SurfelHead {
                 continue;
             }
             let resolution = observer.resolution(place, normal);
-            if resolution > 0.0 && matches!(observer.sight(place, SURFACE_M), Sight::Surface { .. }) {
+            if resolution > 0.0 && observer.sight(place, SURFACE_M) == Sight::Surface {
                 samples[n] = Sample {
                     direction: (place - observer.center).normalize_or(Vec3::X),
                     color: observer.color_at(place),

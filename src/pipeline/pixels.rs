@@ -34,8 +34,7 @@ pub(super) fn kept(
     keep: &Keep,
     left_out: &mut Vec<LeftOut>,
 ) -> Vec<Vec<bool>> {
-    let observers = views.iter().zip(&geometry.depths).map(|(v, d)| Observer::new(v, d)).collect();
-    let judge = Judge { views, geometry, observers, keep };
+    let judge = Judge { views, geometry, observers: geometry.observers(views), keep };
     let verdicts: Vec<Vec<Verdict>> = (0..views.len())
         .map(|i| {
             (0..views[i].image.pixels().len()).into_par_iter().map(|pixel| judge.verdict(i, pixel)).collect()
@@ -92,7 +91,7 @@ impl Judge<'_> {
         self.observers.iter().enumerate().any(|(j, other)| {
             j != i
                 && other.resolution(place, normal) > enough
-                && matches!(other.sight(place, tolerance), Sight::Surface { .. })
+                && other.sight(place, tolerance) == Sight::Surface
         })
     }
 }

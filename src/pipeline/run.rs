@@ -11,7 +11,7 @@ use crate::metrics;
 use crate::prior::{DepthPrior, Geometry, GivenDepth, HullPrior};
 use crate::progress::{Context, ProgressCallback};
 use crate::render::{CpuRenderer, RenderOptions, Renderer};
-use crate::scene::visibility::{Observer, Sight};
+use crate::scene::visibility::{Observer, SURFACE_M, Sight};
 use crate::scene::{Scene, View, undistort};
 use crate::symmetry::{self, MirroredPlace, SymmetryMode};
 use glam::{Quat, Vec3};
@@ -149,32 +149,29 @@ fn complete(
     views: &[View],
     geometry: &Geometry,
 ) -> (Gaussians, symmetry::Completion) {
-    /// Depth from different views agrees to about this, metres.
-    const SURFACE_M: f32 = 0.06;
     /// Seen at this many times the resolution is much better.
     const MUCH_BETTER: f32 = 1.5;
-    let observers: Vec<Observer> =
-        views.iter().zip(&geometry.depths).map(|(v, d)| Observer::new(v, d)).collect();
     let cameras: Vec<_> = views.iter().map(|v| v.camera).collect();
-    let verdict = |gaussians: &Gaussians, i: usize| {
+    let verdict = |observers: &[Observer], gaussians: &Gaussians, i: usize| {
         let (place, normal, own) = mirrored_place(gaussians, i);
         let mut mirrored = MirroredPlace::Unseen;
-        for observer in &observers {
+        for observer in observers {
             // Most views look at the other side: they need no look-up.
             let resolution = observer.resolution(place, normal);
             if resolution <= own / MUCH_BETTER {
                 continue;
             }
             match observer.sight(place, SURFACE_M) {
-                Sight::Surface { .. } if resolution > MUCH_BETTER * own => return MirroredPlace::SeenBetter,
-                Sight::Surface { .. } | Sight::Through => mirrored = MirroredPlace::Seen,
+                Sight::Surface if resolution > MUCH_BETTER * own => return MirroredPlace::SeenBetter,
+                Sight::Surface | Sight::Through => mirrored = MirroredPlace::Seen,
                 Sight::Background | Sight::Silent => {}
             }
         }
         mirrored
     };
     symmetry::complete(gaussians, mode, &cameras, |gaussians| {
-        (0..gaussians.len()).into_par_iter().map(|i| verdict(gaussians, i)).collect()
+        let observers = geometry.observers(views);
+        (0..gaussians.len()).into_par_iter().map(|i| verdict(&observers, gaussians, i)).collect()
     })
 }
 

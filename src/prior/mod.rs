@@ -9,6 +9,7 @@ pub use hull::HullPrior;
 
 use crate::error::Result;
 use crate::progress::Context;
+use crate::scene::visibility::Observer;
 use crate::scene::{DepthMap, View};
 use glam::{DVec3, Vec3};
 
@@ -52,6 +53,11 @@ impl Geometry {
             }
         }
         if count > 0.0 { sum / count } else { DVec3::ZERO }
+    }
+
+    /// The views with their depth, for look-ups.
+    pub fn observers<'a>(&'a self, views: &'a [View]) -> Vec<Observer<'a>> {
+        views.iter().zip(&self.depths).map(|(view, depth)| Observer::new(view, depth)).collect()
     }
 
     /// Normals from depth, where the prior gave none.

@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::gaussians::Gaussians;
 use crate::geometry::Camera;
 use crate::geometry::camera::MAX_SIDE;
-use crate::scene::undistort::pinhole_for;
+use crate::scene::undistort::{Taps, pinhole_for};
 use rayon::prelude::*;
 
 /// Pinhole pixels per pixel and axis. Interpolating at this spacing keeps the peak of the smallest splat, whose
@@ -115,20 +115,14 @@ pub fn render(
 }
 
 /// Premultiplied colour, alpha and accumulated depth, bilinear; edges repeated; nothing at NaN.
-fn sample(picture: &Rendered, [x, y]: [f32; 2]) -> ([f32; 3], f32, f32) {
-    if x.is_nan() {
+fn sample(picture: &Rendered, position: [f32; 2]) -> ([f32; 3], f32, f32) {
+    if position[0].is_nan() {
         return ([0.0; 3], 0.0, 0.0);
     }
-    let (x, y) = (x - 0.5, y - 0.5);
-    let (fx, fy) = (x - x.floor(), y - y.floor());
+    let taps = Taps::new(position, picture.width, picture.height);
     let mut color = [0.0; 3];
     let (mut alpha, mut depth) = (0.0, 0.0);
-    for (dx, dy, weight) in
-        [(0, 0, (1.0 - fx) * (1.0 - fy)), (1, 0, fx * (1.0 - fy)), (0, 1, (1.0 - fx) * fy), (1, 1, fx * fy)]
-    {
-        let u = (x.floor() as i32 + dx).clamp(0, picture.width as i32 - 1) as usize;
-        let v = (y.floor() as i32 + dy).clamp(0, picture.height as i32 - 1) as usize;
-        let i = v * picture.width as usize + u;
+    for (i, weight) in taps.index.into_iter().zip(taps.weights()) {
         for c in 0..3 {
             color[c] += weight * picture.color[i][c];
         }

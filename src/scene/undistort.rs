@@ -115,22 +115,28 @@ fn source_pixels(pinhole: &Camera, source: &Camera) -> Vec<[f32; 2]> {
 }
 
 /// The four pixels around a position, edges repeated, and how far it lies between them.
-struct Taps {
+pub(crate) struct Taps {
     /// Row-order indices: top left, top right, bottom left, bottom right.
-    index: [usize; 4],
+    pub(crate) index: [usize; 4],
     across: f32,
     down: f32,
 }
 
 impl Taps {
     /// Pixel centres lie at (u + 0.5, v + 0.5).
-    fn new([x, y]: [f32; 2], width: u32, height: u32) -> Self {
+    pub(crate) fn new([x, y]: [f32; 2], width: u32, height: u32) -> Self {
         let (x, y) = (x - 0.5, y - 0.5);
         let clamp = |v: f32, n: u32| v.clamp(0.0, (n - 1) as f32) as usize;
         let (u, v) = (x.floor(), y.floor());
         let (u0, u1) = (clamp(u, width), clamp(u + 1.0, width));
         let (v0, v1) = (clamp(v, height) * width as usize, clamp(v + 1.0, height) * width as usize);
         Self { index: [v0 + u0, v0 + u1, v1 + u0, v1 + u1], across: x - u, down: y - v }
+    }
+
+    /// Shares of the four pixels, in the order of `index`; their sum is 1.
+    pub(crate) fn weights(&self) -> [f32; 4] {
+        let (x, y) = (self.across, self.down);
+        [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y]
     }
 
     fn blend(&self, [a, b, c, d]: [f32; 4]) -> f32 {

@@ -5,6 +5,9 @@ use super::{DepthMap, View};
 use crate::geometry::Intrinsics;
 use glam::{Mat3, Vec3};
 
+/// Views of one vehicle agree on a surface to about this, metres.
+pub const SURFACE_M: f32 = 0.06;
+
 /// A view's verdict on a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sight {
@@ -14,11 +17,8 @@ pub enum Sight {
     Background,
     /// The view sees through the point to a surface behind it.
     Through,
-    /// The point lies on the surface this pixel (row-order index) shows.
-    Surface {
-        /// Row-order index of the pixel.
-        pixel: usize,
-    },
+    /// The point lies on the surface that its pixel shows.
+    Surface,
 }
 
 /// One pinhole view and its depth, ready for look-ups.
@@ -71,7 +71,7 @@ impl<'a> Observer<'a> {
                 } else if p.z < surface - tolerance {
                     Sight::Through
                 } else {
-                    Sight::Surface { pixel }
+                    Sight::Surface
                 }
             }
         }

@@ -21,7 +21,8 @@ const NARROWEST_LIMIT_M: f64 = 1.7;
 /// Grid points along the longest axis of the search.
 const SEARCH_POINTS: f64 = 72.0;
 
-/// Finds the box by carving twice, coarsely: first a cube around where the views look, then what was left.
+/// Finds the box by carving coarsely, each time in what was left of the box before: first in a cube around where
+/// the views look.
 pub(super) fn estimate_box(views: &[View], inside: impl Fn(Vec3) -> f32 + Sync) -> Result<VehicleBox> {
     let center = meeting_point(views);
     let radius = search_radius(views, center)?;
