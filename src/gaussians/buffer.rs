@@ -36,6 +36,14 @@ pub struct Gaussian {
     pub sh0: [f32; 3],
 }
 
+/// All but the opacities: what mirroring and moving change, keeping the invariants.
+pub(super) struct MovedArrays<'a> {
+    pub(super) means: &'a mut [[f32; 3]],
+    pub(super) rotations: &'a mut [[f32; 4]],
+    pub(super) scales: &'a mut [[f32; 3]],
+    pub(super) sh: &'a mut [f32],
+}
+
 impl Gaussians {
     /// None yet, with room for `capacity`, colour of SH degree `sh_degree` (0 to 3).
     pub fn with_capacity(sh_degree: u8, capacity: usize) -> Self {
@@ -196,9 +204,14 @@ impl Gaussians {
         }
     }
 
-    /// The arrays that mirroring changes: means, rotations, SH.
-    pub(super) fn arrays_mut(&mut self) -> (&mut [[f32; 3]], &mut [[f32; 4]], &mut [f32]) {
-        (&mut self.means, &mut self.rotations, &mut self.sh)
+    /// The arrays that a move changes.
+    pub(super) fn moved_arrays_mut(&mut self) -> MovedArrays<'_> {
+        MovedArrays {
+            means: &mut self.means,
+            rotations: &mut self.rotations,
+            scales: &mut self.scales,
+            sh: &mut self.sh,
+        }
     }
 
     /// Appends a copy of those with `which[index]`, in order.
