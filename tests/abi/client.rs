@@ -1,5 +1,6 @@
 //! Programs of earlier releases, compiled against the header of their release, run with today's library.
 
+use crate::contents::functions;
 use crate::tools::{STRICT, cc, compile, cxx, have, library_folder, output, root, run, scratch, target};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -60,9 +61,8 @@ fn the_header_of_the_latest_release_is_todays_or_todays_has_more() {
     for release in releases() {
         let header = std::fs::read_to_string(release.join("vg.h")).unwrap();
         let source = std::fs::read_to_string(release.join("client.c")).unwrap();
-        for declaration in header.split("VG_API\n").skip(1) {
-            let name = declaration.split('(').next().unwrap().rsplit([' ', '*']).next().unwrap();
-            assert!(today.contains(name), "{name} of {} is gone", release.display());
+        for name in functions(&header) {
+            assert!(today.contains(&name), "{name} of {} is gone", release.display());
             assert!(source.contains(&format!("{name}(")), "{}: the client does not call {name}", release.display());
         }
     }

@@ -16,10 +16,14 @@
 //! `VG_BLESS=1 cargo test --test abi` rewrites the golden files, for a change that `CHANGELOG.md` argues for.
 //! `VG_NO_SKIP=1` makes a missing tool a failure.
 
+// The tests are callers of C functions.
+#![allow(unsafe_code)]
+
 mod abidiff;
 mod arguments;
 mod buffers;
 mod client;
+mod contents;
 mod header;
 mod layout;
 mod symbols;

@@ -1,5 +1,6 @@
 //! What the shared library exports, and the name under which the loader looks for it.
 
+use crate::contents::functions;
 use crate::tools::{assert_golden, golden, have, root, run, target};
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -7,13 +8,7 @@ use std::process::Command;
 /// Names of the functions in the header.
 pub(crate) fn declared() -> BTreeSet<String> {
     let header = std::fs::read_to_string(root().join("include/vg.h")).unwrap();
-    let after_api = header.split("VG_API\n").skip(1);
-    after_api
-        .map(|declaration| {
-            let name = declaration.split('(').next().unwrap();
-            name.rsplit([' ', '*']).next().unwrap().to_owned()
-        })
-        .collect()
+    functions(&header)
 }
 
 #[test]
