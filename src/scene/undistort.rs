@@ -77,10 +77,12 @@ pub fn pinhole_for(source: &Camera) -> Result<Camera> {
             "a lens model that can be inverted inside the picture",
         ));
     }
-    // Never beyond the allowed growth around the source's own frame, nor beyond what a camera may be.
+    // Never beyond the allowed growth, nor beyond what a camera may be. What is cut is cut evenly around the source's
+    // own frame where the picture reaches beyond it on both sides; a crop from a lens's corner lies wholly to one side.
     let cap = |low: f64, high: f64, size: f64| {
-        let margin = 0.5 * (MAX_GROWTH - 1.0) * size;
-        let (low, high) = (low.max(-margin).floor(), high.min(size + margin).ceil());
+        let (margin, widest) = (0.5 * (MAX_GROWTH - 1.0) * size, MAX_GROWTH * size);
+        let start = (-margin).clamp(low, (high - widest).max(low));
+        let (low, high) = (start.floor(), high.min(start + widest).ceil());
         (low, (high - low).clamp(1.0, f64::from(crate::geometry::camera::MAX_SIDE)))
     };
     let (x0, width) = cap(low[0], high[0], w);
