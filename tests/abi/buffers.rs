@@ -26,7 +26,9 @@ struct Buffers {
 /// FNV-1a.
 fn hash(values: &[f32]) -> u64 {
     let bytes = values.iter().flat_map(|v| v.to_le_bytes());
-    bytes.fold(14_695_981_039_346_656_037, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(1_099_511_628_211))
+    bytes.fold(14_695_981_039_346_656_037, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(1_099_511_628_211)
+    })
 }
 
 unsafe fn made_of_the_sample() -> Buffers {
@@ -38,7 +40,10 @@ unsafe fn made_of_the_sample() -> Buffers {
         assert_eq!(vg_scene_options_init(&raw mut settings, size_of_val(&settings)), vg_status::Ok);
         (settings.names, settings.name_count) = (names.as_ptr(), names.len());
         let mut scene = null_mut();
-        assert_eq!(vg_transforms_open(path.as_ptr(), &raw const settings, &raw mut scene, null_mut()), vg_status::Ok);
+        assert_eq!(
+            vg_transforms_open(path.as_ptr(), &raw const settings, &raw mut scene, null_mut()),
+            vg_status::Ok
+        );
         let views: Vec<vg_view> = (0..4)
             .map(|i| {
                 let mut view: vg_view = std::mem::zeroed();
@@ -51,7 +56,8 @@ unsafe fn made_of_the_sample() -> Buffers {
         assert_eq!(vg_options_init(&raw mut options, size_of_val(&options)), vg_status::Ok);
         options.check = 0;
         let mut car = null_mut();
-        let made = vg_reconstruct(views.as_ptr(), 4, &raw const options, &raw mut car, null_mut(), null_mut());
+        let made =
+            vg_reconstruct(views.as_ptr(), 4, &raw const options, &raw mut car, null_mut(), null_mut());
         assert_eq!(made, vg_status::Ok);
 
         let count = vg_gaussians_count(car);
@@ -71,7 +77,10 @@ unsafe fn made_of_the_sample() -> Buffers {
         let (mut picture, mut depth) = (vec![0.0f32; pixels * 4], vec![0.0f32; pixels]);
         // The unseen side, from the mirrored place of the first camera.
         let mut camera = views[0].camera;
-        assert_eq!(vg_camera_scale(&raw const camera, SIZE[0], SIZE[1], &raw mut camera, null_mut()), vg_status::Ok);
+        assert_eq!(
+            vg_camera_scale(&raw const camera, SIZE[0], SIZE[1], &raw mut camera, null_mut()),
+            vg_status::Ok
+        );
         for (i, v) in camera.vehicle_from_camera.iter_mut().enumerate() {
             // M R diag(-1, 1, 1), M t.
             if (4..8).contains(&i) != (i % 4 == 0) {
@@ -118,15 +127,19 @@ fn the_sample_gives_the_golden_buffers() {
     let buffers = unsafe { made_of_the_sample() };
     let found = packed(&buffers);
     let path = golden().join("sedan.bin");
-    let hashes: String = std::iter::once(format!("{} {}\n", std::env::consts::ARCH, CpuRenderer::new().level()))
-        .chain(
-            ["positions", "scales", "rotations", "opacities", "sh"]
-                .iter()
-                .zip(&buffers.arrays)
-                .map(|(name, (values, _))| format!("{name} {:016x}\n", hash(values))),
-        )
-        .chain([format!("picture {:016x}\n", hash(&buffers.picture)), format!("depth {:016x}\n", hash(&buffers.depth))])
-        .collect();
+    let hashes: String =
+        std::iter::once(format!("{} {}\n", std::env::consts::ARCH, CpuRenderer::new().level()))
+            .chain(
+                ["positions", "scales", "rotations", "opacities", "sh"]
+                    .iter()
+                    .zip(&buffers.arrays)
+                    .map(|(name, (values, _))| format!("{name} {:016x}\n", hash(values))),
+            )
+            .chain([
+                format!("picture {:016x}\n", hash(&buffers.picture)),
+                format!("depth {:016x}\n", hash(&buffers.depth)),
+            ])
+            .collect();
     if std::env::var_os("VG_BLESS").is_some() {
         std::fs::write(&path, &found).unwrap();
         std::fs::write(golden().join("sedan.hash"), &hashes).unwrap();
@@ -139,8 +152,9 @@ fn the_sample_gives_the_golden_buffers() {
     assert_eq!(expected.len(), found.len());
     // Two processors round sums of some hundred terms differently: 1e-4 of metres, colours and alpha is more than
     // that and less than anything to be seen. A threshold may fall differently in a few pixels.
-    let off: Vec<usize> =
-        (0..found.len()).filter(|&i| (expected[i] - found[i]).abs() > 1e-4 * expected[i].abs().max(1.0)).collect();
+    let off: Vec<usize> = (0..found.len())
+        .filter(|&i| (expected[i] - found[i]).abs() > 1e-4 * expected[i].abs().max(1.0))
+        .collect();
     assert!(
         off.len() <= found.len() / 10_000,
         "{} of {} numbers differ, the first from {} to {}",

@@ -45,7 +45,9 @@ fn objects_compiled_at_each_release_still_link_and_run() {
         let object = release.join("client-x86_64-linux.o");
         if std::env::var_os("VG_BLESS").is_some() && !object.exists() {
             let mut command = Command::new(cc());
-            command.args(["-O1", "-fPIE", "-c", "client.c", "-o", "client-x86_64-linux.o"]).current_dir(&release);
+            command
+                .args(["-O1", "-fPIE", "-c", "client.c", "-o", "client-x86_64-linux.o"])
+                .current_dir(&release);
             run(&mut command);
         }
         let folder = scratch();
@@ -63,7 +65,11 @@ fn the_header_of_the_latest_release_is_todays_or_todays_has_more() {
         let source = std::fs::read_to_string(release.join("client.c")).unwrap();
         for name in functions(&header) {
             assert!(today.contains(&name), "{name} of {} is gone", release.display());
-            assert!(source.contains(&format!("{name}(")), "{}: the client does not call {name}", release.display());
+            assert!(
+                source.contains(&format!("{name}(")),
+                "{}: the client does not call {name}",
+                release.display()
+            );
         }
     }
 }
@@ -86,7 +92,8 @@ fn the_client_compiles_clean_as_c_and_as_cxx_and_prints_the_same_with_the_static
     std::fs::copy(&source, &copy).unwrap();
     let mut flags = STRICT.to_vec();
     flags.extend(["-std=c++17", "-O1"]);
-    let as_cxx = run_client(&compile(&cxx(), &flags, &include, &copy, folder.path(), "as_cxx"), folder.path());
+    let as_cxx =
+        run_client(&compile(&cxx(), &flags, &include, &copy, folder.path(), "as_cxx"), folder.path());
     assert_eq!(as_c, as_cxx);
 
     let static_program = folder.path().join("static");

@@ -56,7 +56,10 @@ impl Contents {
              #ifdef __cplusplus\n#define ALIGN alignof\n#else\n#define ALIGN _Alignof\n#endif\nint main(void) {{\n"
         );
         for (name, fields) in &self.structs {
-            let _ = writeln!(program, "printf(\"{name} size %zu align %zu\\n\", sizeof(struct {name}), ALIGN(struct {name}));");
+            let _ = writeln!(
+                program,
+                "printf(\"{name} size %zu align %zu\\n\", sizeof(struct {name}), ALIGN(struct {name}));"
+            );
             for field in fields {
                 let _ = writeln!(
                     program,

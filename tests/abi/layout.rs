@@ -13,9 +13,7 @@ fn c_and_cxx_see_the_golden_layout() {
     let contents = Contents::of(&std::fs::read_to_string(&header).unwrap());
     assert!(contents.structs() >= 10 && contents.enumerators() >= 30, "the header was not understood");
     let mut seen = Vec::new();
-    for (compiler, standards) in
-        [(tools::cc(), ["c11", "c2x"]), (tools::cxx(), ["c++17", "c++20"])]
-    {
+    for (compiler, standards) in [(tools::cc(), ["c11", "c2x"]), (tools::cxx(), ["c++17", "c++20"])] {
         if have(&compiler, "gcc g++", "layout") {
             seen.extend(standards.map(|standard| contents.printed_by(&compiler, standard, &header)));
         }

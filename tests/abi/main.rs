@@ -23,10 +23,10 @@ mod abidiff;
 mod arguments;
 mod buffers;
 mod client;
+#[path = "../common/mod.rs"]
+mod common;
 mod contents;
 mod header;
 mod layout;
 mod symbols;
 mod tools;
-#[path = "../common/mod.rs"]
-mod common;

@@ -16,7 +16,8 @@ fn exactly_the_functions_of_the_golden_list_are_exported() {
     if !have("nm", "binutils", "exported symbols") {
         return;
     }
-    let listing = run(Command::new("nm").args(["-D", "--defined-only", "-f", "posix"]).arg(target().join("libvg.so")));
+    let listing =
+        run(Command::new("nm").args(["-D", "--defined-only", "-f", "posix"]).arg(target().join("libvg.so")));
     let mut exported: Vec<String> = listing
         .lines()
         .map(|line| {
@@ -29,7 +30,8 @@ fn exactly_the_functions_of_the_golden_list_are_exported() {
     let why = "programs may call any function that was ever exported; a new one is blessed with VG_BLESS=1";
     assert_golden(&golden().join("symbols.txt"), &found, why);
 
-    let exported: BTreeSet<String> = exported.iter().map(|l| l.split(' ').next().unwrap().to_owned()).collect();
+    let exported: BTreeSet<String> =
+        exported.iter().map(|l| l.split(' ').next().unwrap().to_owned()).collect();
     assert_eq!(exported, declared(), "the library exports what the header declares");
 }
 
