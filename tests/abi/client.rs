@@ -119,3 +119,18 @@ fn valgrind_finds_no_error_and_no_leak_in_the_client() {
     let errors = String::from_utf8_lossy(&result.stderr);
     assert!(result.status.success() && errors.is_empty(), "{}\n{errors}", result.status);
 }
+
+#[test]
+#[cfg(target_os = "linux")]
+fn the_library_can_be_unloaded_and_leaves_no_thread() {
+    if !have(&cc(), "gcc", "unloading the library") {
+        return;
+    }
+    let folder = scratch();
+    library_folder(folder.path());
+    let program = folder.path().join("reload");
+    let mut command = Command::new(cc());
+    command.args(STRICT).arg("-I").arg(root().join("include")).arg(root().join("tests/abi/reload.c"));
+    run(command.arg("-o").arg(&program).arg("-ldl"));
+    run(Command::new(program).arg(target().join("libvg.so")));
+}

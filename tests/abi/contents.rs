@@ -30,7 +30,8 @@ impl Contents {
                 in_enum = true;
             } else if line.starts_with('}') {
                 in_enum = false;
-                contents.structs.extend(fields.take());
+                // safer-ffi wraps arrays into structs without a name.
+                contents.structs.extend(fields.take().filter(|(tag, _)| !tag.is_empty()));
             } else if let Some((_, fields)) = &mut fields {
                 fields.push(field_name(line));
             } else if in_enum && line.starts_with("VG_") {

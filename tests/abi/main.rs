@@ -20,6 +20,7 @@
 #![allow(unsafe_code)]
 
 mod abidiff;
+mod abixml;
 mod arguments;
 mod buffers;
 mod client;
