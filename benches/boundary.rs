@@ -225,7 +225,8 @@ fn in_turns(rounds: usize, mut rust: impl FnMut(), mut c: impl FnMut()) -> Times
         start.elapsed().as_secs_f64() * 1e3
     };
     // The first of each also pays for memory.
-    (rust(), c());
+    rust();
+    c();
     let pairs: Vec<(f64, f64)> = (0..rounds)
         .map(|round| match round % 2 {
             0 => (timed(&mut rust), timed(&mut c)),

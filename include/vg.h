@@ -34,10 +34,10 @@
  *
  * Depth.     float32, planar, along the optical axis, metres. 0, negative, NaN and infinite mean no measurement.
  *
- * Gaussians. float32, structure of arrays: centres, standard deviations and unit quaternions (w, x, y, z) that turn
- *            the Gaussian's axes to the vehicle's; covariance = R diag(scale^2) R^T. Opacity is linear, 0 to 1. The
- *            colour in unit direction d, from the camera to the Gaussian, is max(0, 0.5 + sum_k sh_k Y_k(d)), with
- *            the basis, order and signs of 3D Gaussian Splatting, sRGB-encoded.
+ * Gaussians. float32, structure of arrays, aligned to 4 bytes: centres, standard deviations, and unit quaternions
+ *            (w, x, y, z) that turn the Gaussian's axes to the vehicle's; covariance = R diag(scale^2) R^T. Opacity
+ *            is linear, 0 to 1. The colour in unit direction d, from the camera to the Gaussian, is
+ *            max(0, 0.5 + sum_k sh_k Y_k(d)), with the basis, order and signs of 3D Gaussian Splatting, sRGB-encoded.
  *
  * Renders.   sRGB-encoded like the photographs. Transparent pictures have straight alpha or, if asked for,
  *            premultiplied; opaque ones have alpha 1. 8-bit values are rounded and clamped; RGBA32F is not clamped

@@ -101,15 +101,18 @@ fn a_second_generator_writes_a_header_of_the_golden_layout() {
     assert_eq!(contents.printed_by(&tools::cc(), "c11", &header), golden_layout());
 }
 
+/// Calls a function, with somewhere to put the error.
+type Call = Box<dyn Fn(*mut *mut vg_error) -> Outcome>;
+
 /// Each function with arguments that do not matter: the panic comes first. Status functions get an error object.
-fn every_function() -> Vec<(&'static str, Box<dyn Fn(*mut *mut vg_error) -> Outcome>)> {
+fn every_function() -> Vec<(&'static str, Call)> {
     macro_rules! functions {
         ($($name:ident ( $($argument:expr),* ) $kind:ident;)*) => { vec![$((
             stringify!($name),
             Box::new(|error: *mut *mut vg_error| {
                 let _ = error;
                 functions!(@call $kind, error, $name($($argument),*))
-            }) as Box<dyn Fn(*mut *mut vg_error) -> Outcome>,
+            }) as Call,
         )),*] };
         (@call reports, $error:ident, $name:ident($($argument:expr),*)) => {
             Outcome::Status(unsafe { $name($($argument,)* $error) })
