@@ -124,11 +124,18 @@ template <class T> class [[nodiscard]] Result {
 /// The result of a call that only succeeds or fails.
 template <> class [[nodiscard]] Result<void> {
   public:
-    Result() = default;
+    Result() noexcept = default;
     Result(Error error) : error_(std::move(error)), ok_(false) {}
 
     bool ok() const noexcept { return ok_; }
     explicit operator bool() const noexcept { return ok_; }
+
+    /// Nothing, so that what takes any Result also takes this one.
+    void take() const noexcept {
+        if (!ok_) {
+            detail::misused("no value:", error_.message.c_str());
+        }
+    }
 
     const Error &error() const noexcept {
         if (ok_) {
