@@ -2,9 +2,9 @@
 //
 //     colmap_vehicle FOLDER VEHICLE_FROM_WORLD.json CAR.ply [IMAGE...]
 //
-// FOLDER has COLMAP's model in sparse/0, photographs in images/ and masks in masks/. COLMAP's world lies anywhere and
-// has any scale, so it also takes the similarity to the vehicle's frame, a 4x4 matrix in a JSON file; `vg align` finds
-// one. IMAGE...: the photographs to use; all if none are named.
+// FOLDER has COLMAP's model in sparse/0, photographs in images/ and masks in masks/. COLMAP's world lies
+// anywhere and has any scale, so it also takes the similarity to the vehicle's frame, a 4x4 matrix in a JSON
+// file; `vg align` finds one. IMAGE...: the photographs to use; all if none are named.
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -22,7 +22,7 @@ template <class T> T must(vg::Result<T> result) {
     return result.take();
 }
 
-// The 16 numbers of {"vehicle_from_world": [[...], [...], [...], [...]]}; nothing else in the file is looked at.
+// The 16 numbers of {"vehicle_from_world": [[...], [...], [...], [...]]}; the rest is not looked at.
 static vg::Similarity read_similarity(const std::string &path) {
     std::ifstream file(path);
     const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
@@ -71,12 +71,13 @@ int main(int argc, char **argv) {
     must(made.gaussians.save_ply(argv[3]));
 
     const vg_report_figures figures = made.report.figures();
-    std::printf("%s: %zu Gaussians of %u views, of them %zu mirrored; %.2f x %.2f x %.2f m; %.0f ms\n", argv[3],
-                made.gaussians.size(), figures.views_used, static_cast<std::size_t>(figures.mirrored_count),
-                figures.extent_high[0] - figures.extent_low[0], figures.extent_high[1] - figures.extent_low[1],
-                figures.extent_high[2] - figures.extent_low[2], figures.total_ms);
-    std::printf("on the photographs themselves: %.1f dB, silhouettes overlap by %.3f\n", figures.input_psnr_db,
-                figures.input_silhouette_iou);
+    std::printf(
+        "%s: %zu Gaussians of %u views, of them %zu mirrored; %.2f x %.2f x %.2f m; %.0f ms\n", argv[3],
+        made.gaussians.size(), figures.views_used, static_cast<std::size_t>(figures.mirrored_count),
+        figures.extent_high[0] - figures.extent_low[0], figures.extent_high[1] - figures.extent_low[1],
+        figures.extent_high[2] - figures.extent_low[2], figures.total_ms);
+    std::printf("on the photographs themselves: %.1f dB, silhouettes overlap by %.3f\n",
+                figures.input_psnr_db, figures.input_silhouette_iou);
     // made.report.json() tells the rest: times by stage, what was left out and why.
     return 0;
 }

@@ -1,6 +1,6 @@
 /*
- * The shortest program that does it all: reads the first views of a scene, makes the vehicle, draws it as the view
- * after them, and writes a PPM. Only the C library and libvg.
+ * The shortest program that does it all: reads the first views of a scene, makes the vehicle, draws it as the
+ * view after them, and writes a PPM. Only the C library and libvg.
  *
  *     embed_min SCENE COUNT OUT.ppm        e.g.: embed_min tests/data/sedan 4 unseen.ppm
  */
@@ -30,8 +30,8 @@ int main(int argc, char **argv) {
     const size_t count = strtoul(argv[2], NULL, 10);
     must(vg_transforms_open(argv[1], NULL, &scene, &error), error);
 
-    /* A view: photograph, mask, depth where there is one, lens and pose. Here it points into the scene; it could as
-     * well point to a camera driver's memory. */
+    /* A view: photograph, mask, depth where there is one, lens and pose. Here it points into the scene; it
+     * could as well point to a camera driver's memory. */
     vg_view *views = calloc(count + 1, sizeof *views);
     for (size_t i = 0; i <= count; i++) {
         vg_view_init(&views[i], sizeof views[i]);

@@ -2,8 +2,8 @@
 //
 //     opencv_onesided FOLDER OUT_FOLDER [--no-depth] [--show]
 //
-// FOLDER is a nerfstudio scene: transforms.json, photographs, masks, and depth where it was measured. Views from the
-// right of the vehicle (y < 0) are used; for those from the left, OUT_FOLDER/<name>.png is drawn.
+// FOLDER is a nerfstudio scene: transforms.json, photographs, masks, and depth where it was measured. Views
+// from the right of the vehicle (y < 0) are used; for those from the left, OUT_FOLDER/<name>.png is drawn.
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -28,8 +28,9 @@ struct Frame {
     vg_camera camera;
 };
 
-// The cameras, read here to show where each number goes. With a calibration of OpenCV's take vg::camera_from_opencv,
-// which knows that OpenCV puts the centre of the first pixel elsewhere; with a tracker's boxes take vg::pose_from_box.
+// The cameras, read here to show where each number goes. With a calibration of OpenCV's take
+// vg::camera_from_opencv, which knows that OpenCV puts the centre of the first pixel elsewhere; with a
+// tracker's boxes take vg::pose_from_box.
 static std::vector<Frame> read_frames(const std::string &folder) {
     std::vector<Frame> frames;
     const cv::FileStorage json(folder + "/transforms.json", cv::FileStorage::READ);
@@ -42,8 +43,8 @@ static std::vector<Frame> read_frames(const std::string &folder) {
         frame.image = node["file_path"].string();
         frame.mask = node["mask_path"].string();
         frame.depth = node["depth_file_path"].empty() ? "" : node["depth_file_path"].string();
-        frame.camera = must(vg::pinhole(node["fl_x"].real(), node["fl_y"].real(), node["cx"].real(), node["cy"].real(),
-                                        static_cast<std::uint32_t>(node["w"].real()),
+        frame.camera = must(vg::pinhole(node["fl_x"].real(), node["fl_y"].real(), node["cx"].real(),
+                                        node["cy"].real(), static_cast<std::uint32_t>(node["w"].real()),
                                         static_cast<std::uint32_t>(node["h"].real()),
                                         must(vg::pose_from_opengl(camera_to_world))));
         frames.push_back(frame);

@@ -3,35 +3,37 @@
  * cv::Mat and Eigen where they are there. License: MIT or Apache-2.0.
  *
  *     std::vector<vg_view> views;
- *     views.push_back(vg::view(photograph, mask, camera).take());      // cv::Mat, cv::Mat, vg_camera; and more
+ *     views.push_back(vg::view(photograph, mask, camera).take());      // cv::Mat, cv::Mat, vg_camera
  *     auto made = vg::reconstruct(views);
  *     if (!made) {
  *         std::fprintf(stderr, "%s\n", made.error().message.c_str());
  *         return 1;
  *     }
- *     made->gaussians.save_ply("car.ply");
  *     cv::Mat picture;
- *     vg::render_into(picture, made->gaussians, other_camera);
+ *     vg::render_into(picture, made->gaussians, other_camera).take();
  *
- * The chapter CONVENTIONS of vg.h holds for all of this: frames, poses, pixels, images, threads. What this file
- * adds:
+ * The chapter CONVENTIONS of vg.h holds for all of this: frames, poses, pixels, images, threads. What this
+ * file adds:
  *
- * Results.    Functions that can fail return a Result, which holds either the value or an Error and may not be
- *             ignored. Nothing here throws or needs exceptions or run-time type information; std::vector and
- *             std::string may throw std::bad_alloc where exceptions are on.
+ * Results.   Functions that can fail return a Result, which holds either the value or an Error and may not be
+ *            ignored. take() and value() of a Result that holds an Error end the program with its message.
+ *            Nothing here throws or needs exceptions or run-time type information; std::vector and
+ *            std::string may throw std::bad_alloc where exceptions are on.
  *
- * Ownership.  Context, Scene, Gaussians and Report own one handle and are moved, not copied. One that was moved
- *             away is empty: no views, no Gaussians, and an error where it is used. A vg_view, a vg_image and a
- *             Span own nothing: they point into a Scene, a cv::Mat, or Gaussians, which must outlive them.
+ * Ownership. Context, Scene, Gaussians and Report own one handle and are moved, not copied. One that was
+ *            moved away is empty: no views, no Gaussians, and an error where it is used. A vg_view, a
+ *            vg_image and a Span own nothing: they point into a Scene, a cv::Mat or Gaussians, which must
+ *            outlive them.
  *
- * Options.    Options, RenderOptions, SceneOptions are the structs of vg.h with their default values set. Their
- *             fields are explained there.
+ * Options.   Options, RenderOptions, SceneOptions are the structs of vg.h with their default values set.
+ *            Their fields are explained there.
  *
- * Callbacks.  on_progress and on_log take any callable. They come on the calling thread, one at a time. An exception
- *             that leaves one ends the program (std::terminate), because it cannot pass through the library.
+ * Callbacks. on_progress and on_log take any callable. They come on the calling thread, one at a time. An
+ *            exception that leaves one ends the program (std::terminate), because it cannot pass through the
+ *            library.
  *
- * OpenCV      is used where <opencv2/core.hpp> is found, Eigen where <Eigen/Core> is; VG_NO_OPENCV and VG_NO_EIGEN,
- *             defined before this file, keep them out. They only add functions.
+ * OpenCV     is used where <opencv2/core.hpp> is found, Eigen where <Eigen/Core> is. VG_NO_OPENCV and
+ *            VG_NO_EIGEN, defined before this file, keep them out. They only add functions.
  */
 #ifndef VG_HPP
 #define VG_HPP
@@ -62,7 +64,7 @@
 
 namespace vg {
 
-// ---- Results ------------------------------------------------------------------------------------------------------
+// ---- Results
 
 /// Why a call failed.
 struct Error {
@@ -198,7 +200,7 @@ struct Free {
 
 } // namespace detail
 
-// ---- Small things -------------------------------------------------------------------------------------------------
+// ---- Small things
 
 /// Version of the library that is running, "0.1.0".
 inline const char *version() noexcept {
@@ -264,10 +266,10 @@ template <class Callback> void *user_pointer(const Callback &callback) noexcept 
 
 } // namespace detail
 
-// ---- Context ------------------------------------------------------------------------------------------------------
+// ---- Context
 
-/// Worker threads and scratch memory, for calls that follow each other: `options.context = context.get()`. It must
-/// outlive the calls that use it; any number of threads may use it at a time.
+/// Worker threads and scratch memory, for calls that follow each other: `options.context = context.get()`. It
+/// must outlive the calls that use it; any number of threads may use it at a time.
 class Context {
   public:
     using Handle = vg_context;
@@ -294,7 +296,7 @@ class Context {
     std::unique_ptr<vg_context, detail::Free> handle_;
 };
 
-// ---- Cameras and poses --------------------------------------------------------------------------------------------
+// ---- Cameras and poses
 
 /// A camera without lens distortion, pixels. The centre of the top-left pixel is (0.5, 0.5).
 inline Result<vg_camera> pinhole(double fx, double fy, double cx, double cy, std::uint32_t width,
@@ -324,13 +326,16 @@ enum class Lens {
     Fisheye,
 };
 
-/// OpenCV's calibration: the 3x3 camera matrix, row-major, and the distortion, as vg_camera_from_opencv takes them.
-inline Result<vg_camera> camera_from_opencv(const std::array<double, 9> &k, const std::vector<double> &distortion,
-                                            Lens lens, std::uint32_t width, std::uint32_t height,
+/// OpenCV's calibration: the 3x3 camera matrix, row-major, and 0, 4, 5, 8, 12 or 14 numbers of distortion, see
+/// vg_camera_from_opencv.
+inline Result<vg_camera> camera_from_opencv(const std::array<double, 9> &k,
+                                            const std::vector<double> &distortion, Lens lens,
+                                            std::uint32_t width, std::uint32_t height,
                                             const Pose &vehicle_from_camera = identity_pose) {
     return detail::filled(vg_camera{}, [&](vg_camera *out, vg_error **error) {
-        return vg_camera_from_opencv(k.data(), distortion.data(), distortion.size(), lens == Lens::Fisheye ? 1 : 0,
-                                     width, height, vehicle_from_camera.data(), out, error);
+        return vg_camera_from_opencv(k.data(), distortion.data(), distortion.size(),
+                                     lens == Lens::Fisheye ? 1 : 0, width, height, vehicle_from_camera.data(),
+                                     out, error);
     });
 }
 
@@ -350,22 +355,23 @@ inline Result<vg_camera> scaled(const vg_camera &camera, std::uint32_t width, st
 }
 
 /// The camera of a part of the picture.
-inline Result<vg_camera> cropped(const vg_camera &camera, std::uint32_t x, std::uint32_t y, std::uint32_t width,
-                                 std::uint32_t height) {
+inline Result<vg_camera> cropped(const vg_camera &camera, std::uint32_t x, std::uint32_t y,
+                                 std::uint32_t width, std::uint32_t height) {
     return detail::filled(vg_camera{}, [&](vg_camera *out, vg_error **error) {
         return vg_camera_crop(&camera, x, y, width, height, out, error);
     });
 }
 
 /// Column and row of a point in the vehicle's frame; an error where it is not in front of the camera.
-inline Result<std::array<double, 2>> project(const vg_camera &camera, const std::array<double, 3> &point_vehicle) {
+inline Result<std::array<double, 2>> project(const vg_camera &camera,
+                                             const std::array<double, 3> &point_vehicle) {
     return detail::filled(std::array<double, 2>{}, [&](std::array<double, 2> *out, vg_error **error) {
         return vg_camera_project(&camera, point_vehicle.data(), out->data(), error);
     });
 }
 
-/// A pose from COLMAP's QW QX QY QZ and TX TY TZ, world to camera. `vehicle_from_world` NULL: the world is the
-/// vehicle's frame.
+/// A pose from COLMAP's QW QX QY QZ and TX TY TZ, world to camera. `vehicle_from_world` NULL: the world is
+/// the vehicle's frame.
 inline Result<Pose> pose_from_colmap(const std::array<double, 4> &qvec, const std::array<double, 3> &tvec,
                                      const Similarity *vehicle_from_world = nullptr) {
     return detail::filled(Pose{}, [&](Pose *out, vg_error **error) {
@@ -374,8 +380,10 @@ inline Result<Pose> pose_from_colmap(const std::array<double, 4> &qvec, const st
     });
 }
 
-/// A pose from camera to world with OpenGL's camera axes (x right, y up, z backward), as nerfstudio and Blender have.
-inline Result<Pose> pose_from_opengl(const Pose &camera_to_world, const Similarity *vehicle_from_world = nullptr) {
+/// A pose from camera to world with OpenGL's camera axes (x right, y up, z backward), as nerfstudio and
+/// Blender have.
+inline Result<Pose> pose_from_opengl(const Pose &camera_to_world,
+                                     const Similarity *vehicle_from_world = nullptr) {
     return detail::filled(Pose{}, [&](Pose *out, vg_error **error) {
         const double *similarity = vehicle_from_world == nullptr ? nullptr : vehicle_from_world->data();
         return vg_pose_from_opengl(camera_to_world.data(), similarity, out->data(), error);
@@ -389,7 +397,7 @@ inline Result<Pose> pose_from_box(const Pose &vehicle_in_ego, const Pose &camera
     });
 }
 
-// ---- Views --------------------------------------------------------------------------------------------------------
+// ---- Views
 
 /// A picture in the caller's memory. `row_stride`: bytes from one row to the next; 0: rows without gaps.
 inline vg_image image(const void *data, std::uint32_t width, std::uint32_t height, vg_format format,
@@ -403,8 +411,8 @@ inline vg_image image(const void *data, std::uint32_t width, std::uint32_t heigh
     return image;
 }
 
-/// A photograph with its camera. `vg_image{}`: no mask, no depth. `name`: NULL, or a name for messages and the
-/// report, which must outlive the view.
+/// A photograph with its camera. `vg_image{}`: no mask, no depth. `name`: NULL, or a name for messages and
+/// the report, which must outlive the view.
 inline vg_view view(const vg_image &image, const vg_image &mask, const vg_camera &camera,
                     const vg_image &depth = vg_image{}, const char *name = nullptr) noexcept {
     vg_view view;
@@ -474,7 +482,8 @@ class Scene {
     vg_scene *release() noexcept { return handle_.release(); }
 
   private:
-    template <class Open> static Result<Scene> open(Open open, const std::string &path, const SceneOptions &options) {
+    template <class Open>
+    static Result<Scene> open(Open open, const std::string &path, const SceneOptions &options) {
         vg_scene_options c_options = options;
         std::vector<const char *> names;
         for (const std::string &name : options.view_names) {
@@ -495,11 +504,13 @@ class Scene {
     std::unique_ptr<vg_scene, detail::Free> handle_;
 };
 
-// ---- Gaussians ----------------------------------------------------------------------------------------------------
+// ---- Gaussians
 
 /// Arrays to make Gaussians from.
 struct GaussianArrays : vg_gaussian_arrays {
-    GaussianArrays() noexcept : vg_gaussian_arrays{} { vg_gaussian_arrays_init(this, sizeof(vg_gaussian_arrays)); }
+    GaussianArrays() noexcept : vg_gaussian_arrays{} {
+        vg_gaussian_arrays_init(this, sizeof(vg_gaussian_arrays));
+    }
 };
 
 /// A set of Gaussians, which never changes. Any number of threads may read or render one at a time.
@@ -512,14 +523,16 @@ class Gaussians {
 
     /// From a PLY file in the layout of 3D Gaussian Splatting.
     static Result<Gaussians> load_ply(const std::string &path) {
-        return detail::made<Gaussians>(
-            [&](vg_gaussians **out, vg_error **error) { return vg_gaussians_load_ply(path.c_str(), out, error); });
+        return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
+            return vg_gaussians_load_ply(path.c_str(), out, error);
+        });
     }
 
     /// From the caller's arrays, which are copied and checked.
     static Result<Gaussians> from_arrays(const vg_gaussian_arrays &arrays) {
-        return detail::made<Gaussians>(
-            [&](vg_gaussians **out, vg_error **error) { return vg_gaussians_from_arrays(&arrays, out, error); });
+        return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
+            return vg_gaussians_from_arrays(&arrays, out, error);
+        });
     }
 
     /// As a PLY file in the layout of 3D Gaussian Splatting.
@@ -556,11 +569,15 @@ class Gaussians {
     std::int32_t sh_degree() const noexcept { return vg_gaussians_sh_degree(handle_.get()); }
 
     /// Centres, metres. `[size][3]`
-    Span<const float> positions() const noexcept { return {vg_gaussians_positions(handle_.get()), 3 * size()}; }
+    Span<const float> positions() const noexcept {
+        return {vg_gaussians_positions(handle_.get()), 3 * size()};
+    }
     /// Standard deviations along the Gaussian's own axes, metres. `[size][3]`
     Span<const float> scales() const noexcept { return {vg_gaussians_scales(handle_.get()), 3 * size()}; }
     /// Unit quaternions w, x, y, z: the Gaussian's axes to the vehicle's. `[size][4]`
-    Span<const float> rotations() const noexcept { return {vg_gaussians_rotations(handle_.get()), 4 * size()}; }
+    Span<const float> rotations() const noexcept {
+        return {vg_gaussians_rotations(handle_.get()), 4 * size()};
+    }
     /// Peak opacities, 0 to 1. `[size]`
     Span<const float> opacities() const noexcept { return {vg_gaussians_opacities(handle_.get()), size()}; }
     /// Coefficients of spherical harmonics. `[size][(sh_degree + 1)^2][3]`
@@ -577,7 +594,7 @@ class Gaussians {
     std::unique_ptr<vg_gaussians, detail::Free> handle_;
 };
 
-// ---- Reconstruction -----------------------------------------------------------------------------------------------
+// ---- Reconstruction
 
 /// Settings of a reconstruction.
 struct Options : vg_options {
@@ -632,7 +649,8 @@ struct Reconstruction {
 };
 
 /// Makes a complete vehicle of photographs of one side. The same views and options give the same bytes.
-inline Result<Reconstruction> reconstruct(const vg_view *views, std::size_t view_count, const Options &options = {}) {
+inline Result<Reconstruction> reconstruct(const vg_view *views, std::size_t view_count,
+                                          const Options &options = {}) {
     vg_options c_options = options;
     if (options.on_progress) {
         c_options.progress = detail::progress;
@@ -656,11 +674,13 @@ inline Result<Reconstruction> reconstruct(const std::vector<vg_view> &views, con
     return reconstruct(views.data(), views.size(), options);
 }
 
-// ---- Pictures -----------------------------------------------------------------------------------------------------
+// ---- Pictures
 
 /// Settings of a picture.
 struct RenderOptions : vg_render_options {
-    RenderOptions() noexcept : vg_render_options{} { vg_render_options_init(this, sizeof(vg_render_options)); }
+    RenderOptions() noexcept : vg_render_options{} {
+        vg_render_options_init(this, sizeof(vg_render_options));
+    }
 };
 
 /// Where a picture goes: the caller's memory.
@@ -680,15 +700,16 @@ struct Picture {
 };
 
 /// Draws Gaussians as a camera sees them into memory of the caller's.
-inline Result<void> render_into(const vg_image_target &target, const Gaussians &gaussians, const vg_camera &camera,
-                                const RenderOptions &options = {}) {
+inline Result<void> render_into(const vg_image_target &target, const Gaussians &gaussians,
+                                const vg_camera &camera, const RenderOptions &options = {}) {
     return detail::done(
         [&](vg_error **error) { return vg_render(gaussians.get(), &camera, &options, &target, error); });
 }
 
-/// Draws Gaussians as a camera sees them. `format`: RGBA8 or BGRA8; RGB8 or BGR8 where the background is opaque.
-inline Result<Picture> render(const Gaussians &gaussians, const vg_camera &camera, const RenderOptions &options = {},
-                              vg_format format = VG_FORMAT_RGBA8) {
+/// Draws Gaussians as a camera sees them. `format`: RGBA8 or BGRA8; RGB8 or BGR8 where the background is
+/// opaque.
+inline Result<Picture> render(const Gaussians &gaussians, const vg_camera &camera,
+                              const RenderOptions &options = {}, vg_format format = VG_FORMAT_RGBA8) {
     std::size_t channels = 0;
     switch (format) {
     case VG_FORMAT_RGB8:
@@ -725,7 +746,7 @@ inline Result<Picture> render(const Gaussians &gaussians, const vg_camera &camer
     return picture;
 }
 
-// ---- OpenCV -------------------------------------------------------------------------------------------------------
+// ---- OpenCV
 
 #ifdef VG_HAS_OPENCV
 
@@ -753,7 +774,8 @@ struct MatFormat {
 
 /// `mat` in the format that goes with its type. cv::imread leaves an empty one where it cannot read the file.
 template <std::size_t N>
-Result<vg_image> lent(const char *argument, const cv::Mat &mat, const MatFormat (&formats)[N], const char *allowed) {
+Result<vg_image> lent(const char *argument, const cv::Mat &mat, const MatFormat (&formats)[N],
+                      const char *allowed) {
     if (mat.empty()) {
         return Error{VG_STATUS_ARGUMENT, std::string(argument) + ": an empty cv::Mat, allowed: " + allowed};
     }
@@ -768,8 +790,8 @@ Result<vg_image> lent(const char *argument, const cv::Mat &mat, const MatFormat 
 
 } // namespace detail
 
-/// A cv::Mat whose pixels are lent, not copied: a named one, which must outlive the view. A temporary is refused,
-/// because its pixels would be gone: give a region of a picture (`frame(box)`) a name first.
+/// A cv::Mat whose pixels are lent, not copied: a named one, which must outlive the view. A temporary is
+/// refused, because its pixels would be gone: give a region of a picture (`frame(box)`) a name first.
 class LentMat {
   public:
     LentMat(const cv::Mat &mat) noexcept : mat_(&mat) {}
@@ -780,8 +802,8 @@ class LentMat {
     const cv::Mat *mat_;
 };
 
-/// A photograph: CV_8UC3 is BGR, CV_8UC4 is BGRA, CV_8UC1 is gray, as OpenCV has them. Regions of larger pictures
-/// too. Pixels are not copied.
+/// A photograph: CV_8UC3 is BGR, CV_8UC4 is BGRA, CV_8UC1 is gray, as OpenCV has them. Regions of larger
+/// pictures too. Pixels are not copied.
 inline Result<vg_image> image(LentMat mat) {
     static constexpr detail::MatFormat formats[] = {
         {CV_8UC3, VG_FORMAT_BGR8}, {CV_8UC4, VG_FORMAT_BGRA8}, {CV_8UC1, VG_FORMAT_GRAY8}};
@@ -827,7 +849,8 @@ inline Result<vg_view> view(LentMat photograph, LentMat vehicle_mask, const vg_c
 }
 
 /// The same with depth in metres.
-inline Result<vg_view> view(LentMat photograph, LentMat vehicle_mask, LentMat metres, const vg_camera &camera) {
+inline Result<vg_view> view(LentMat photograph, LentMat vehicle_mask, LentMat metres,
+                            const vg_camera &camera) {
     Result<vg_view> made = view(photograph, vehicle_mask, camera);
     const Result<vg_image> measured = depth(metres);
     if (!measured) {
@@ -839,9 +862,10 @@ inline Result<vg_view> view(LentMat photograph, LentMat vehicle_mask, LentMat me
     return made;
 }
 
-/// OpenCV's calibration as cv::calibrateCamera leaves it: the 3x3 camera matrix, and a row or column of distortion.
-inline Result<vg_camera> camera_from_opencv(const cv::Mat &k, const cv::Mat &distortion, Lens lens, cv::Size size,
-                                            const Pose &vehicle_from_camera = identity_pose) {
+/// OpenCV's calibration as cv::calibrateCamera leaves it: the 3x3 camera matrix, and a row or column of
+/// distortion.
+inline Result<vg_camera> camera_from_opencv(const cv::Mat &k, const cv::Mat &distortion, Lens lens,
+                                            cv::Size size, const Pose &vehicle_from_camera = identity_pose) {
     if (k.dims != 2 || k.rows != 3 || k.cols != 3 || k.channels() != 1) {
         return detail::refused("k", k, "3x3 of CV_64FC1 or CV_32FC1");
     }
@@ -850,8 +874,8 @@ inline Result<vg_camera> camera_from_opencv(const cv::Mat &k, const cv::Mat &dis
         return detail::refused("distortion", distortion, "one row or column of CV_64FC1 or CV_32FC1");
     }
     if (size.width < 0 || size.height < 0) {
-        return Error{VG_STATUS_ARGUMENT, "size: " + std::to_string(size.width) + "x" + std::to_string(size.height) +
-                                             ", allowed: 1x1 to 8192x8192"};
+        return Error{VG_STATUS_ARGUMENT, "size: " + std::to_string(size.width) + "x" +
+                                             std::to_string(size.height) + ", allowed: 1x1 to 8192x8192"};
     }
     cv::Mat matrix, row;
     k.convertTo(matrix, CV_64F);
@@ -871,17 +895,21 @@ inline Result<vg_camera> camera_from_opencv(const cv::Mat &k, const cv::Mat &dis
 namespace detail {
 
 /// Draws into matrices of the camera's size, or makes them where they are empty. `depth`: NULL: none.
-inline Result<void> render_mats(cv::Mat &color, cv::Mat *depth, const Gaussians &gaussians, const vg_camera &camera,
-                                const RenderOptions &options) {
+inline Result<void> render_mats(cv::Mat &color, cv::Mat *depth, const Gaussians &gaussians,
+                                const vg_camera &camera, const RenderOptions &options) {
     const bool opaque = options.background != VG_BACKGROUND_TRANSPARENT;
     const int columns = static_cast<int>(camera.width), rows = static_cast<int>(camera.height);
     const std::string size = std::to_string(camera.width) + "x" + std::to_string(camera.height);
     if (camera.width > 8192 || camera.height > 8192 || columns == 0 || rows == 0) {
         return Error{VG_STATUS_ARGUMENT, "camera: " + size + ", allowed: 1x1 to 8192x8192"};
     }
-    const auto fits = [&](const cv::Mat &mat) { return mat.dims == 2 && mat.cols == columns && mat.rows == rows; };
-    if (!color.empty() && (!fits(color) || !(color.type() == CV_8UC4 || (opaque && color.type() == CV_8UC3)))) {
-        return refused("color", color, size + " of " + (opaque ? "CV_8UC3 or CV_8UC4" : "CV_8UC4") + ", or empty");
+    const auto fits = [&](const cv::Mat &mat) {
+        return mat.dims == 2 && mat.cols == columns && mat.rows == rows;
+    };
+    if (!color.empty() &&
+        (!fits(color) || !(color.type() == CV_8UC4 || (opaque && color.type() == CV_8UC3)))) {
+        return refused("color", color,
+                       size + " of " + (opaque ? "CV_8UC3 or CV_8UC4" : "CV_8UC4") + ", or empty");
     }
     if (depth != nullptr && !depth->empty() && (!fits(*depth) || depth->type() != CV_32FC1)) {
         return refused("depth", *depth, size + " of CV_32FC1, or empty");
@@ -914,22 +942,22 @@ inline Result<void> render_mats(cv::Mat &color, cv::Mat *depth, const Gaussians 
 
 } // namespace detail
 
-/// Draws into a matrix, which may be a region of a larger one: CV_8UC3 (BGR) or CV_8UC4 (BGRA) of the camera's size.
-/// An empty one becomes CV_8UC3, or CV_8UC4 where the background is transparent.
+/// Draws into a matrix, which may be a region of a larger one: CV_8UC3 (BGR) or CV_8UC4 (BGRA) of the
+/// camera's size. An empty one becomes CV_8UC3, or CV_8UC4 where the background is transparent.
 inline Result<void> render_into(cv::Mat &color, const Gaussians &gaussians, const vg_camera &camera,
                                 const RenderOptions &options = {}) {
     return detail::render_mats(color, nullptr, gaussians, camera, options);
 }
 
 /// The same with planar depth in metres: CV_32FC1 of the camera's size, or empty.
-inline Result<void> render_into(cv::Mat &color, cv::Mat &depth, const Gaussians &gaussians, const vg_camera &camera,
-                                const RenderOptions &options = {}) {
+inline Result<void> render_into(cv::Mat &color, cv::Mat &depth, const Gaussians &gaussians,
+                                const vg_camera &camera, const RenderOptions &options = {}) {
     return detail::render_mats(color, &depth, gaussians, camera, options);
 }
 
 #endif // VG_HAS_OPENCV
 
-// ---- Eigen --------------------------------------------------------------------------------------------------------
+// ---- Eigen
 
 #ifdef VG_HAS_EIGEN
 
@@ -941,7 +969,8 @@ template <class Derived> Pose pose(const Eigen::MatrixBase<Derived> &vehicle_fro
     Pose pose{};
     for (int row = 0; row < 3; row++) {
         for (int column = 0; column < 4; column++) {
-            pose[static_cast<std::size_t>(4 * row + column)] = static_cast<double>(vehicle_from_camera(row, column));
+            pose[static_cast<std::size_t>(4 * row + column)] =
+                static_cast<double>(vehicle_from_camera(row, column));
         }
     }
     return pose;
@@ -973,7 +1002,8 @@ template <class Derived> Similarity similarity(const Eigen::MatrixBase<Derived> 
     Similarity similarity{};
     for (int row = 0; row < 4; row++) {
         for (int column = 0; column < 4; column++) {
-            similarity[static_cast<std::size_t>(4 * row + column)] = static_cast<double>(to_from(row, column));
+            similarity[static_cast<std::size_t>(4 * row + column)] =
+                static_cast<double>(to_from(row, column));
         }
     }
     return similarity;

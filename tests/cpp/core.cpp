@@ -1,11 +1,15 @@
 // vg.hpp without other libraries: results, ownership, callbacks, errors. Prints nothing where all is well.
 //
 //     core SCRATCH_FOLDER
+#include <csignal>
 #include <cstring>
 #include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
+
+#include <sys/wait.h>
+#include <unistd.h>
 #if __cplusplus >= 202002L
 #include <span>
 #endif
@@ -18,10 +22,12 @@ std::size_t size_seen_by_the_other_file(const vg::Gaussians &gaussians);
 namespace {
 
 template <class T>
-constexpr bool only_moves = std::is_nothrow_move_constructible_v<T> && std::is_nothrow_move_assignable_v<T> &&
-                            std::is_nothrow_default_constructible_v<T> && !std::is_copy_constructible_v<T> &&
-                            !std::is_copy_assignable_v<T>;
-static_assert(only_moves<vg::Context> && only_moves<vg::Scene> && only_moves<vg::Gaussians> && only_moves<vg::Report>);
+constexpr bool only_moves =
+    std::is_nothrow_move_constructible_v<T> && std::is_nothrow_move_assignable_v<T> &&
+    std::is_nothrow_default_constructible_v<T> && !std::is_copy_constructible_v<T> &&
+    !std::is_copy_assignable_v<T>;
+static_assert(only_moves<vg::Context> && only_moves<vg::Scene> && only_moves<vg::Gaussians> &&
+              only_moves<vg::Report>);
 static_assert(!std::is_convertible_v<vg::Result<int>, bool>, "a Result is a condition, not a number");
 static_assert(!std::is_convertible_v<vg_gaussians *, vg::Gaussians>, "taking a handle over is written down");
 
@@ -48,7 +54,22 @@ void results_hold_a_value_or_an_error() {
 
     const vg::Result<void> done;
     CHECK(done.ok() && done);
+    done.take();
     CHECK(failed(vg::Result<void>(vg::Error{VG_STATUS_FORMAT, "odd"}), VG_STATUS_FORMAT, "odd"));
+}
+
+/// How a program ends that takes a value which is not there.
+void taking_what_is_not_there_ends_the_program() {
+    const pid_t child = fork();
+    if (child == 0) {
+        CHECK(std::freopen("/dev/null", "w", stderr) != nullptr);
+        vg::Result<vg::Gaussians> none(vg::Error{VG_STATUS_IO, "gone"});
+        const vg::Gaussians taken = none.take();
+        std::exit(0);
+    }
+    int status = 0;
+    CHECK(child > 0 && waitpid(child, &status, 0) == child);
+    CHECK(WIFSIGNALED(status) && WTERMSIG(status) == SIGABRT);
 }
 
 void handles_move_and_leave_nothing_behind() {
@@ -71,7 +92,8 @@ void what_is_empty_is_harmless() {
     CHECK(failed(none.save_ply("nowhere.ply"), VG_STATUS_ARGUMENT, "gaussians"));
     CHECK(failed(vg::render(none, camera_at_right()), VG_STATUS_ARGUMENT, "gaussians"));
     const vg::Report report;
-    CHECK(report.figures().gaussian_count == 0 && std::strlen(report.json()) == 0 && report.point_colors().empty());
+    CHECK(report.figures().gaussian_count == 0 && std::strlen(report.json()) == 0 &&
+          report.point_colors().empty());
     const vg::Scene scene;
     CHECK(scene.size() == 0 && scene.views()->empty());
     CHECK(failed(scene.view(0), VG_STATUS_ARGUMENT, "scene"));
@@ -225,6 +247,7 @@ int main(int argc, char **argv) {
     CHECK(argc == 2);
     CHECK(std::string(vg::version()).find('.') != std::string::npos);
     results_hold_a_value_or_an_error();
+    taking_what_is_not_there_ends_the_program();
     handles_move_and_leave_nothing_behind();
     what_is_empty_is_harmless();
     cameras_are_made_moved_scaled_and_cropped();

@@ -55,7 +55,8 @@ void similarities_arrive_row_major() {
 }
 
 void arrays_are_matrices_that_are_not_copied() {
-    const float positions[6] = {1, 2, 3, 4, 5, 6}, scales[6] = {1, 1, 1, 1, 1, 1}, rotations[8] = {1, 0, 0, 0, 1, 0, 0, 0};
+    const float positions[6] = {1, 2, 3, 4, 5, 6}, scales[6] = {1, 1, 1, 1, 1, 1},
+                rotations[8] = {1, 0, 0, 0, 1, 0, 0, 0};
     const float opacities[2] = {0.5F, 1}, sh[6] = {};
     vg::GaussianArrays arrays;
     arrays.count = 2;

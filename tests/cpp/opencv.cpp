@@ -1,4 +1,4 @@
-// vg.hpp with OpenCV: what a cv::Mat may be, that it is not copied, and that its channels arrive in their order.
+// vg.hpp with OpenCV: what a cv::Mat may be, that it is not copied, that its channels arrive in their order.
 #include <opencv2/core.hpp>
 
 #include <string>
@@ -13,7 +13,8 @@
 
 namespace {
 
-static_assert(std::is_convertible_v<cv::Mat &, vg::LentMat> && std::is_convertible_v<const cv::Mat1b &, vg::LentMat>);
+static_assert(std::is_convertible_v<cv::Mat &, vg::LentMat> &&
+              std::is_convertible_v<const cv::Mat1b &, vg::LentMat>);
 static_assert(!std::is_convertible_v<cv::Mat, vg::LentMat>, "the pixels of a temporary would be gone");
 
 constexpr int columns = static_cast<int>(side);
@@ -84,13 +85,17 @@ vg::Gaussians the_same_bytes_in_every_layout(const Mats &mats) {
 
 void other_types_are_errors_that_name_them(const Mats &mats) {
     const vg_camera camera = camera_at_right();
-    const cv::Mat sixteen(columns, columns, CV_16UC3), empty, cube(3, std::vector<int>{4, 5, 6}.data(), CV_8UC1);
+    const cv::Mat sixteen(columns, columns, CV_16UC3), empty,
+        cube(3, std::vector<int>{4, 5, 6}.data(), CV_8UC1);
     const cv::Mat millimetres(columns, columns, CV_16UC1);
-    CHECK(failed(vg::view(sixteen, mats.mask, camera), VG_STATUS_ARGUMENT, "image: 64x64 of CV_16UC3, allowed: CV_8UC3"));
+    CHECK(failed(vg::view(sixteen, mats.mask, camera), VG_STATUS_ARGUMENT,
+                 "image: 64x64 of CV_16UC3, allowed: CV_8UC3"));
     CHECK(failed(vg::view(empty, mats.mask, camera), VG_STATUS_ARGUMENT, "image: an empty cv::Mat"));
     CHECK(failed(vg::view(mats.bgr, empty, camera), VG_STATUS_ARGUMENT, "mask: an empty cv::Mat"));
-    CHECK(failed(vg::view(mats.bgr, mats.bgr, camera), VG_STATUS_ARGUMENT, "mask: 64x64 of CV_8UC3, allowed: CV_8UC1"));
-    CHECK(failed(vg::view(mats.bgr, mats.mask, millimetres, camera), VG_STATUS_ARGUMENT, "depth: 64x64 of CV_16UC1"));
+    CHECK(failed(vg::view(mats.bgr, mats.bgr, camera), VG_STATUS_ARGUMENT,
+                 "mask: 64x64 of CV_8UC3, allowed: CV_8UC1"));
+    CHECK(failed(vg::view(mats.bgr, mats.mask, millimetres, camera), VG_STATUS_ARGUMENT,
+                 "depth: 64x64 of CV_16UC1"));
     CHECK(failed(vg::view(mats.bgr, cube, camera), VG_STATUS_ARGUMENT, "mask: 3 dimensions of CV_8UC1"));
     CHECK(failed(vg::image_rgb(mats.mask), VG_STATUS_ARGUMENT, "allowed: CV_8UC3 (RGB)"));
 }
@@ -120,8 +125,10 @@ void pictures_go_into_matrices(const vg::Gaussians &car) {
     CHECK(vg::render_into(bgra, car, camera, transparent).ok() && bgra.type() == CV_8UC4);
     CHECK(bgra.at<cv::Vec4b>(0, 0)[3] == 0 && bgra.at<cv::Vec4b>(columns / 2, columns / 2)[3] > 200);
 
-    CHECK(failed(vg::render_into(region, car, camera, transparent), VG_STATUS_ARGUMENT, "color: 64x64 of CV_8UC3"));
-    CHECK(failed(vg::render_into(larger, car, camera), VG_STATUS_ARGUMENT, "color: 70x68 of CV_8UC3, allowed: 64x64"));
+    CHECK(failed(vg::render_into(region, car, camera, transparent), VG_STATUS_ARGUMENT,
+                 "color: 64x64 of CV_8UC3"));
+    CHECK(failed(vg::render_into(larger, car, camera), VG_STATUS_ARGUMENT,
+                 "color: 70x68 of CV_8UC3, allowed: 64x64"));
     CHECK(failed(vg::render_into(color, bgra, car, camera), VG_STATUS_ARGUMENT, "depth: 64x64 of CV_8UC4"));
     cv::Mat untouched;
     transparent.blur = -1;
@@ -138,13 +145,18 @@ void calibrations_are_taken_as_opencv_leaves_them() {
     const vg_camera plain = vg::camera_from_opencv(k32, cv::Mat(), vg::Lens::Standard, size).take();
     CHECK(plain.model == VG_CAMERA_MODEL_PINHOLE && !(plain.params[2] < 31.5) && !(plain.params[2] > 31.5));
     for (const cv::Mat &distortion : {row, column}) {
-        const vg_camera camera = vg::camera_from_opencv(k, distortion, vg::Lens::Standard, size, pose_at_right()).take();
-        CHECK(camera.model == VG_CAMERA_MODEL_FULL_OPENCV && camera.params[4] > 0.0999 && camera.params[4] < 0.1001);
+        const vg_camera camera =
+            vg::camera_from_opencv(k, distortion, vg::Lens::Standard, size, pose_at_right()).take();
+        CHECK(camera.model == VG_CAMERA_MODEL_FULL_OPENCV && camera.params[4] > 0.0999 &&
+              camera.params[4] < 0.1001);
         CHECK(camera.vehicle_from_camera[7] < -3.9);
     }
-    CHECK(failed(vg::camera_from_opencv(row, row, vg::Lens::Standard, size), VG_STATUS_ARGUMENT, "k: 5x1 of CV_64FC1"));
-    CHECK(failed(vg::camera_from_opencv(k, k, vg::Lens::Standard, size), VG_STATUS_ARGUMENT, "distortion: 3x3"));
-    CHECK(failed(vg::camera_from_opencv(k, row, vg::Lens::Standard, cv::Size(-1, 4)), VG_STATUS_ARGUMENT, "-1x4"));
+    CHECK(failed(vg::camera_from_opencv(row, row, vg::Lens::Standard, size), VG_STATUS_ARGUMENT,
+                 "k: 5x1 of CV_64FC1"));
+    CHECK(failed(vg::camera_from_opencv(k, k, vg::Lens::Standard, size), VG_STATUS_ARGUMENT,
+                 "distortion: 3x3"));
+    CHECK(failed(vg::camera_from_opencv(k, row, vg::Lens::Standard, cv::Size(-1, 4)), VG_STATUS_ARGUMENT,
+                 "-1x4"));
 }
 
 } // namespace

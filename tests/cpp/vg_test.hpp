@@ -9,24 +9,25 @@
 
 #include "vg.hpp"
 
-#define CHECK(...)                                                                       \
-    do {                                                                                 \
-        if (!(__VA_ARGS__)) {                                                            \
-            std::fprintf(stderr, "%s:%d: not true: %s\n", __FILE__, __LINE__, #__VA_ARGS__); \
-            std::exit(1);                                                                \
-        }                                                                                \
+#define CHECK(...)                                                                                           \
+    do {                                                                                                     \
+        if (!(__VA_ARGS__)) {                                                                                \
+            std::fprintf(stderr, "%s:%d: not true: %s\n", __FILE__, __LINE__, #__VA_ARGS__);                 \
+            std::exit(1);                                                                                    \
+        }                                                                                                    \
     } while (0)
 
 /// Whether a call failed with this status and these words.
 template <class T> bool failed(const vg::Result<T> &result, vg_status status, const char *words) {
-    if (result || result.error().status != status || result.error().message.find(words) == std::string::npos) {
+    if (result || result.error().status != status ||
+        result.error().message.find(words) == std::string::npos) {
         std::fprintf(stderr, "%s\n", result ? "(succeeded)" : result.error().message.c_str());
         return false;
     }
     return true;
 }
 
-/// What one photograph of a box without depth or one of two pixels with depth needs.
+/// Columns and rows of the photograph.
 inline constexpr std::uint32_t side = 64;
 
 /// A camera 4 m to the right of the vehicle, which looks at it.
