@@ -1,0 +1,1034 @@
+/*
+ * vg.hpp - the functions of vg.h for C++17: handles that free themselves, results instead of out parameters,
+ * cv::Mat and Eigen where they are there. License: MIT or Apache-2.0.
+ *
+ *     std::vector<vg_view> views;
+ *     views.push_back(vg::view(photograph, mask, camera).take());      // cv::Mat, cv::Mat, vg_camera
+ *     auto made = vg::reconstruct(views);
+ *     if (!made) {
+ *         std::fprintf(stderr, "%s\n", made.error().message.c_str());
+ *         return 1;
+ *     }
+ *     cv::Mat picture;
+ *     vg::render_into(picture, made->gaussians, other_camera).take();
+ *
+ * The chapter CONVENTIONS of vg.h holds for all of this: frames, poses, pixels, images, threads. What this
+ * file adds:
+ *
+ * Results.   Functions that can fail return a Result, which holds either the value or an Error and may not be
+ *            ignored. take() and value() of a Result that holds an Error end the program with its message.
+ *            Nothing here throws or needs exceptions or run-time type information; std::vector and
+ *            std::string may throw std::bad_alloc where exceptions are on.
+ *
+ * Ownership. Context, Scene, Gaussians and Report own one handle and are moved, not copied. One that was
+ *            moved away is empty: no views, no Gaussians, and an error where it is used. A vg_view, a
+ *            vg_image and a Span own nothing: they point into a Scene, a cv::Mat or Gaussians, which must
+ *            outlive them.
+ *
+ * Options.   Options, RenderOptions, SceneOptions are the structs of vg.h with their default values set.
+ *            Their fields are explained there.
+ *
+ * Callbacks. on_progress and on_log take any callable. They come on the calling thread, one at a time. An
+ *            exception that leaves one ends the program (std::terminate), because it cannot pass through the
+ *            library.
+ *
+ * OpenCV     is used where <opencv2/core.hpp> is found, Eigen where <Eigen/Core> is. VG_NO_OPENCV and
+ *            VG_NO_EIGEN, defined before this file, keep them out. They only add functions.
+ */
+#ifndef VG_HPP
+#define VG_HPP
+
+#include "vg.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#if !defined(VG_NO_OPENCV) && __has_include(<opencv2/core.hpp>)
+#define VG_HAS_OPENCV 1
+#include <opencv2/core.hpp>
+#endif
+#if !defined(VG_NO_EIGEN) && __has_include(<Eigen/Core>) && __has_include(<Eigen/Geometry>)
+#define VG_HAS_EIGEN 1
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#endif
+
+namespace vg {
+
+// ---- Results
+
+/// Why a call failed.
+struct Error {
+    vg_status status = VG_STATUS_INTERNAL;
+    /// One line of UTF-8: the argument, what was found, what is allowed.
+    std::string message;
+};
+
+namespace detail {
+
+/// A value was asked of a failed call, or an error of one that succeeded: a bug of the caller's.
+[[noreturn]] inline void misused(const char *what, const char *message) noexcept {
+    std::fprintf(stderr, "vg::Result: %s %s\n", what, message);
+    std::abort();
+}
+
+} // namespace detail
+
+/// A value, or why there is none. Asking for the one that is not there ends the program.
+template <class T> class [[nodiscard]] Result {
+  public:
+    Result(T value) : held_(std::in_place_index<0>, std::move(value)) {}
+    Result(Error error) : held_(std::in_place_index<1>, std::move(error)) {}
+
+    bool ok() const noexcept { return held_.index() == 0; }
+    explicit operator bool() const noexcept { return ok(); }
+
+    T &value() & noexcept { return *checked(this); }
+    const T &value() const & noexcept { return *checked(this); }
+    T &&value() && noexcept { return std::move(*checked(this)); }
+    T &operator*() & noexcept { return value(); }
+    const T &operator*() const & noexcept { return value(); }
+    T *operator->() noexcept { return checked(this); }
+    const T *operator->() const noexcept { return checked(this); }
+
+    /// The value, moved out: `vg::Context context = vg::Context::make().take();`
+    T take() { return std::move(*checked(this)); }
+
+    const Error &error() const noexcept {
+        const Error *error = std::get_if<1>(&held_);
+        if (error == nullptr) {
+            detail::misused("no error:", "the call succeeded");
+        }
+        return *error;
+    }
+
+  private:
+    template <class Self> static auto checked(Self *self) noexcept -> decltype(std::get_if<0>(&self->held_)) {
+        auto *value = std::get_if<0>(&self->held_);
+        if (value == nullptr) {
+            detail::misused("no value:", std::get_if<1>(&self->held_)->message.c_str());
+        }
+        return value;
+    }
+
+    std::variant<T, Error> held_;
+};
+
+/// The result of a call that only succeeds or fails.
+template <> class [[nodiscard]] Result<void> {
+  public:
+    Result() noexcept = default;
+    Result(Error error) : error_(std::move(error)), ok_(false) {}
+
+    bool ok() const noexcept { return ok_; }
+    explicit operator bool() const noexcept { return ok_; }
+
+    /// Nothing, so that what takes any Result also takes this one.
+    void take() const noexcept {
+        if (!ok_) {
+            detail::misused("no value:", error_.message.c_str());
+        }
+    }
+
+    const Error &error() const noexcept {
+        if (ok_) {
+            detail::misused("no error:", "the call succeeded");
+        }
+        return error_;
+    }
+
+  private:
+    Error error_{};
+    bool ok_ = true;
+};
+
+namespace detail {
+
+/// The C error as ours; frees it.
+inline Error caught(vg_status status, vg_error *error) {
+    Error ours{status, vg_error_message(error)};
+    vg_error_free(error);
+    return ours;
+}
+
+/// Calls a function that has nothing to give but its status.
+template <class Call> Result<void> done(Call call) {
+    vg_error *error = nullptr;
+    const vg_status status = call(&error);
+    if (status != VG_STATUS_OK) {
+        return caught(status, error);
+    }
+    return {};
+}
+
+/// Calls a function that fills `value`.
+template <class T, class Call> Result<T> filled(T value, Call call) {
+    vg_error *error = nullptr;
+    const vg_status status = call(&value, &error);
+    if (status != VG_STATUS_OK) {
+        return caught(status, error);
+    }
+    return value;
+}
+
+/// Calls a function that makes a handle.
+template <class Owner, class Call> Result<Owner> made(Call call) {
+    typename Owner::Handle *handle = nullptr;
+    vg_error *error = nullptr;
+    const vg_status status = call(&handle, &error);
+    if (status != VG_STATUS_OK) {
+        return caught(status, error);
+    }
+    return Owner(handle);
+}
+
+struct Free {
+    void operator()(vg_context *handle) const noexcept { vg_context_free(handle); }
+    void operator()(vg_gaussians *handle) const noexcept { vg_gaussians_free(handle); }
+    void operator()(vg_report *handle) const noexcept { vg_report_free(handle); }
+    void operator()(vg_scene *handle) const noexcept { vg_scene_free(handle); }
+};
+
+} // namespace detail
+
+// ---- Small things
+
+/// Version of the library that is running, "0.1.0".
+inline const char *version() noexcept {
+    return vg_version();
+}
+
+/// Elements that somebody else owns. Converts to std::span where there is one.
+template <class T> class Span {
+  public:
+    constexpr Span() noexcept = default;
+    constexpr Span(T *data, std::size_t size) noexcept : data_(data), size_(size) {}
+
+    constexpr T *data() const noexcept { return data_; }
+    constexpr std::size_t size() const noexcept { return size_; }
+    constexpr bool empty() const noexcept { return size_ == 0; }
+    constexpr T *begin() const noexcept { return data_; }
+    constexpr T *end() const noexcept { return data_ + size_; }
+    constexpr T &operator[](std::size_t index) const noexcept { return data_[index]; }
+
+  private:
+    T *data_ = nullptr;
+    std::size_t size_ = 0;
+};
+
+/// Camera to vehicle: the first three rows [R | t] of a 4x4 matrix, ROW-MAJOR, metres.
+using Pose = std::array<double, 12>;
+
+/// A 4x4 similarity, ROW-MAJOR, as `vehicle_from_world`.
+using Similarity = std::array<double, 16>;
+
+/// The pose of a camera that stands in the vehicle's origin and looks along its z axis.
+constexpr Pose identity_pose{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+
+/// What a progress callback wants.
+enum class Flow {
+    Continue,
+    /// Ends the call with VG_STATUS_CANCELLED.
+    Cancel,
+};
+
+/// Told the stage, and how much of it is done, 0 to 1.
+using ProgressCallback = std::function<Flow(const char *stage, double fraction)>;
+
+/// Told one line.
+using LogCallback = std::function<void(vg_log_level level, const char *message)>;
+
+namespace detail {
+
+inline std::int32_t progress(const char *stage, double fraction, void *user) noexcept {
+    const auto &callback = *static_cast<const ProgressCallback *>(user);
+    return callback(stage, fraction) == Flow::Continue ? 0 : 1;
+}
+
+inline void log(std::int32_t level, const char *message, void *user) noexcept {
+    const auto &callback = *static_cast<const LogCallback *>(user);
+    callback(static_cast<vg_log_level>(level), message);
+}
+
+/// A callback as the pointer that comes back to the functions above, which do not change it.
+template <class Callback> void *user_pointer(const Callback &callback) noexcept {
+    return const_cast<Callback *>(&callback);
+}
+
+} // namespace detail
+
+// ---- Context
+
+/// Worker threads and scratch memory, for calls that follow each other: `options.context = context.get()`. It
+/// must outlive the calls that use it; any number of threads may use it at a time.
+class Context {
+  public:
+    using Handle = vg_context;
+
+    Context() noexcept = default;
+    explicit Context(vg_context *owned) noexcept : handle_(owned) {}
+
+    /// `threads`: 1 to 1024; 0: one per core.
+    static Result<Context> make(std::uint32_t threads = 0) {
+        vg_context_options options;
+        vg_context_options_init(&options, sizeof options);
+        options.threads = threads;
+        return detail::made<Context>(
+            [&](vg_context **out, vg_error **error) { return vg_context_new(&options, out, error); });
+    }
+
+    std::uint32_t threads() const noexcept { return vg_context_threads(handle_.get()); }
+
+    vg_context *get() const noexcept { return handle_.get(); }
+    /// The handle, now the caller's to free.
+    vg_context *release() noexcept { return handle_.release(); }
+
+  private:
+    std::unique_ptr<vg_context, detail::Free> handle_;
+};
+
+// ---- Cameras and poses
+
+/// A camera without lens distortion, pixels. The centre of the top-left pixel is (0.5, 0.5).
+inline Result<vg_camera> pinhole(double fx, double fy, double cx, double cy, std::uint32_t width,
+                                 std::uint32_t height, const Pose &vehicle_from_camera = identity_pose) {
+    const double params[4] = {fx, fy, cx, cy};
+    return detail::filled(vg_camera{}, [&](vg_camera *out, vg_error **error) {
+        return vg_camera_from_colmap_model(VG_CAMERA_MODEL_PINHOLE, params, 4, width, height,
+                                           vehicle_from_camera.data(), out, error);
+    });
+}
+
+/// One of COLMAP's cameras: its model's number and its parameters in COLMAP's order.
+inline Result<vg_camera> camera_from_colmap(std::int32_t model, const std::vector<double> &params,
+                                            std::uint32_t width, std::uint32_t height,
+                                            const Pose &vehicle_from_camera = identity_pose) {
+    return detail::filled(vg_camera{}, [&](vg_camera *out, vg_error **error) {
+        return vg_camera_from_colmap_model(model, params.data(), params.size(), width, height,
+                                           vehicle_from_camera.data(), out, error);
+    });
+}
+
+/// Which of OpenCV's calibrations.
+enum class Lens {
+    /// cv::calibrateCamera
+    Standard,
+    /// cv::fisheye::calibrate
+    Fisheye,
+};
+
+/// OpenCV's calibration: the 3x3 camera matrix, row-major, and 0, 4, 5, 8, 12 or 14 numbers of distortion, see
+/// vg_camera_from_opencv.
+inline Result<vg_camera> camera_from_opencv(const std::array<double, 9> &k,
+                                            const std::vector<double> &distortion, Lens lens,
+                                            std::uint32_t width, std::uint32_t height,
+                                            const Pose &vehicle_from_camera = identity_pose) {
+    return detail::filled(vg_camera{}, [&](vg_camera *out, vg_error **error) {
+        return vg_camera_from_opencv(k.data(), distortion.data(), distortion.size(),
+                                     lens == Lens::Fisheye ? 1 : 0, width, height, vehicle_from_camera.data(),
+                                     out, error);
+    });
+}
+
+/// The same camera elsewhere.
+inline vg_camera placed(vg_camera camera, const Pose &vehicle_from_camera) noexcept {
+    for (std::size_t i = 0; i < vehicle_from_camera.size(); i++) {
+        camera.vehicle_from_camera[i] = vehicle_from_camera[i];
+    }
+    return camera;
+}
+
+/// The camera of the picture resized.
+inline Result<vg_camera> scaled(const vg_camera &camera, std::uint32_t width, std::uint32_t height) {
+    return detail::filled(vg_camera{}, [&](vg_camera *out, vg_error **error) {
+        return vg_camera_scale(&camera, width, height, out, error);
+    });
+}
+
+/// The camera of a part of the picture.
+inline Result<vg_camera> cropped(const vg_camera &camera, std::uint32_t x, std::uint32_t y,
+                                 std::uint32_t width, std::uint32_t height) {
+    return detail::filled(vg_camera{}, [&](vg_camera *out, vg_error **error) {
+        return vg_camera_crop(&camera, x, y, width, height, out, error);
+    });
+}
+
+/// Column and row of a point in the vehicle's frame; an error where it is not in front of the camera.
+inline Result<std::array<double, 2>> project(const vg_camera &camera,
+                                             const std::array<double, 3> &point_vehicle) {
+    return detail::filled(std::array<double, 2>{}, [&](std::array<double, 2> *out, vg_error **error) {
+        return vg_camera_project(&camera, point_vehicle.data(), out->data(), error);
+    });
+}
+
+/// A pose from COLMAP's QW QX QY QZ and TX TY TZ, world to camera. `vehicle_from_world` NULL: the world is
+/// the vehicle's frame.
+inline Result<Pose> pose_from_colmap(const std::array<double, 4> &qvec, const std::array<double, 3> &tvec,
+                                     const Similarity *vehicle_from_world = nullptr) {
+    return detail::filled(Pose{}, [&](Pose *out, vg_error **error) {
+        const double *similarity = vehicle_from_world == nullptr ? nullptr : vehicle_from_world->data();
+        return vg_pose_from_colmap(qvec.data(), tvec.data(), similarity, out->data(), error);
+    });
+}
+
+/// A pose from camera to world with OpenGL's camera axes (x right, y up, z backward), as nerfstudio and
+/// Blender have.
+inline Result<Pose> pose_from_opengl(const Pose &camera_to_world,
+                                     const Similarity *vehicle_from_world = nullptr) {
+    return detail::filled(Pose{}, [&](Pose *out, vg_error **error) {
+        const double *similarity = vehicle_from_world == nullptr ? nullptr : vehicle_from_world->data();
+        return vg_pose_from_opengl(camera_to_world.data(), similarity, out->data(), error);
+    });
+}
+
+/// A pose from where a tracked vehicle and the camera are in a common frame.
+inline Result<Pose> pose_from_box(const Pose &vehicle_in_ego, const Pose &camera_in_ego) {
+    return detail::filled(Pose{}, [&](Pose *out, vg_error **error) {
+        return vg_pose_from_box(vehicle_in_ego.data(), camera_in_ego.data(), out->data(), error);
+    });
+}
+
+// ---- Views
+
+/// A picture in the caller's memory. `row_stride`: bytes from one row to the next; 0: rows without gaps.
+inline vg_image image(const void *data, std::uint32_t width, std::uint32_t height, vg_format format,
+                      std::size_t row_stride = 0) noexcept {
+    vg_image image{};
+    image.data = data;
+    image.row_stride = row_stride;
+    image.width = width;
+    image.height = height;
+    image.format = format;
+    return image;
+}
+
+/// A photograph with its camera. `vg_image{}`: no mask, no depth. `name`: NULL, or a name for messages and
+/// the report, which must outlive the view.
+inline vg_view view(const vg_image &image, const vg_image &mask, const vg_camera &camera,
+                    const vg_image &depth = vg_image{}, const char *name = nullptr) noexcept {
+    vg_view view;
+    vg_view_init(&view, sizeof view);
+    view.name = name;
+    view.camera = camera;
+    view.image = image;
+    view.mask = mask;
+    view.depth = depth;
+    return view;
+}
+
+/// What of a scene's files is wanted.
+struct SceneOptions : vg_scene_options {
+    /// The views wanted, in this order, by path, file name or stem; none: all. Used instead of `names`.
+    std::vector<std::string> view_names;
+    /// Told what is legal but looks like a mistake. Used instead of `log`.
+    LogCallback on_log;
+
+    SceneOptions() noexcept : vg_scene_options{} { vg_scene_options_init(this, sizeof(vg_scene_options)); }
+};
+
+/// Views read from files, with their pixels.
+class Scene {
+  public:
+    using Handle = vg_scene;
+
+    Scene() noexcept = default;
+    explicit Scene(vg_scene *owned) noexcept : handle_(owned) {}
+
+    /// A nerfstudio scene: a `transforms.json`, or a folder with one.
+    static Result<Scene> open_transforms(const std::string &path, const SceneOptions &options = {}) {
+        return open(vg_transforms_open, path, options);
+    }
+
+    /// A COLMAP folder. `options.vehicle_from_world` is needed.
+    static Result<Scene> open_colmap(const std::string &path, const SceneOptions &options) {
+        return open(vg_colmap_open, path, options);
+    }
+
+    std::size_t size() const noexcept { return vg_scene_view_count(handle_.get()); }
+
+    /// One view, which points into the scene.
+    Result<vg_view> view(std::size_t index) const {
+        vg_view view;
+        vg_view_init(&view, sizeof view);
+        return detail::filled(view, [&](vg_view *out, vg_error **error) {
+            return vg_scene_get_view(handle_.get(), index, out, error);
+        });
+    }
+
+    /// All views, which point into the scene.
+    Result<std::vector<vg_view>> views() const {
+        std::vector<vg_view> views;
+        for (std::size_t index = 0; index < size(); index++) {
+            Result<vg_view> found = view(index);
+            if (!found) {
+                return found.error();
+            }
+            views.push_back(*found);
+        }
+        return views;
+    }
+
+    const vg_scene *get() const noexcept { return handle_.get(); }
+    /// The handle, now the caller's to free.
+    vg_scene *release() noexcept { return handle_.release(); }
+
+  private:
+    template <class Open>
+    static Result<Scene> open(Open open, const std::string &path, const SceneOptions &options) {
+        vg_scene_options c_options = options;
+        std::vector<const char *> names;
+        for (const std::string &name : options.view_names) {
+            names.push_back(name.c_str());
+        }
+        if (!names.empty()) {
+            c_options.names = names.data();
+            c_options.name_count = names.size();
+        }
+        if (options.on_log) {
+            c_options.log = detail::log;
+            c_options.log_user = detail::user_pointer(options.on_log);
+        }
+        return detail::made<Scene>(
+            [&](vg_scene **out, vg_error **error) { return open(path.c_str(), &c_options, out, error); });
+    }
+
+    std::unique_ptr<vg_scene, detail::Free> handle_;
+};
+
+// ---- Gaussians
+
+/// Arrays to make Gaussians from.
+struct GaussianArrays : vg_gaussian_arrays {
+    GaussianArrays() noexcept : vg_gaussian_arrays{} {
+        vg_gaussian_arrays_init(this, sizeof(vg_gaussian_arrays));
+    }
+};
+
+/// A set of Gaussians, which never changes. Any number of threads may read or render one at a time.
+class Gaussians {
+  public:
+    using Handle = vg_gaussians;
+
+    Gaussians() noexcept = default;
+    explicit Gaussians(vg_gaussians *owned) noexcept : handle_(owned) {}
+
+    /// From a PLY file in the layout of 3D Gaussian Splatting.
+    static Result<Gaussians> load_ply(const std::string &path) {
+        return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
+            return vg_gaussians_load_ply(path.c_str(), out, error);
+        });
+    }
+
+    /// From the caller's arrays, which are copied and checked.
+    static Result<Gaussians> from_arrays(const vg_gaussian_arrays &arrays) {
+        return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
+            return vg_gaussians_from_arrays(&arrays, out, error);
+        });
+    }
+
+    /// As a PLY file in the layout of 3D Gaussian Splatting.
+    Result<void> save_ply(const std::string &path) const {
+        return detail::done(
+            [&](vg_error **error) { return vg_gaussians_save_ply(handle_.get(), path.c_str(), error); });
+    }
+
+    /// The same in another frame: rotation, positive scale, translation in metres.
+    Result<Gaussians> transformed(const Similarity &to_from_vehicle) const {
+        return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
+            return vg_gaussians_transform(handle_.get(), to_from_vehicle.data(), out, error);
+        });
+    }
+
+    /// The mirror image across y = 0.
+    Result<Gaussians> mirrored() const {
+        return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
+            return vg_gaussians_mirror(handle_.get(), out, error);
+        });
+    }
+
+    /// These, then those of `second`, in one.
+    Result<Gaussians> merged(const Gaussians &second) const {
+        return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
+            return vg_gaussians_merge(handle_.get(), second.get(), out, error);
+        });
+    }
+
+    std::size_t size() const noexcept { return vg_gaussians_count(handle_.get()); }
+    bool empty() const noexcept { return size() == 0; }
+
+    /// Degree of the spherical harmonics, 0 to 3.
+    std::int32_t sh_degree() const noexcept { return vg_gaussians_sh_degree(handle_.get()); }
+
+    /// Centres, metres. `[size][3]`
+    Span<const float> positions() const noexcept {
+        return {vg_gaussians_positions(handle_.get()), 3 * size()};
+    }
+    /// Standard deviations along the Gaussian's own axes, metres. `[size][3]`
+    Span<const float> scales() const noexcept { return {vg_gaussians_scales(handle_.get()), 3 * size()}; }
+    /// Unit quaternions w, x, y, z: the Gaussian's axes to the vehicle's. `[size][4]`
+    Span<const float> rotations() const noexcept {
+        return {vg_gaussians_rotations(handle_.get()), 4 * size()};
+    }
+    /// Peak opacities, 0 to 1. `[size]`
+    Span<const float> opacities() const noexcept { return {vg_gaussians_opacities(handle_.get()), size()}; }
+    /// Coefficients of spherical harmonics. `[size][(sh_degree + 1)^2][3]`
+    Span<const float> sh() const noexcept {
+        const std::size_t side = static_cast<std::size_t>(sh_degree()) + 1;
+        return {vg_gaussians_sh(handle_.get()), 3 * side * side * size()};
+    }
+
+    const vg_gaussians *get() const noexcept { return handle_.get(); }
+    /// The handle, now the caller's to free.
+    vg_gaussians *release() noexcept { return handle_.release(); }
+
+  private:
+    std::unique_ptr<vg_gaussians, detail::Free> handle_;
+};
+
+// ---- Reconstruction
+
+/// Settings of a reconstruction.
+struct Options : vg_options {
+    /// Used instead of `progress`.
+    ProgressCallback on_progress;
+    /// Used instead of `log`.
+    LogCallback on_log;
+
+    Options() noexcept : vg_options{} { vg_options_init(this, sizeof(vg_options)); }
+};
+
+/// What a reconstruction did.
+class Report {
+  public:
+    using Handle = vg_report;
+
+    Report() noexcept = default;
+    explicit Report(vg_report *owned) noexcept : handle_(owned) {}
+
+    /// The main figures; zeros where the report is empty.
+    vg_report_figures figures() const noexcept {
+        vg_report_figures figures;
+        vg_report_figures_init(&figures, sizeof figures);
+        vg_report_get_figures(handle_.get(), &figures, nullptr);
+        return figures;
+    }
+
+    /// The whole report. Lives as long as the report.
+    const char *json() const noexcept { return vg_report_json(handle_.get()); }
+
+    /// Positions of the metric point cloud, metres; none unless `options.points` was 1. `[count][3]`
+    Span<const float> point_positions() const noexcept {
+        return {vg_report_point_positions(handle_.get()), 3 * vg_report_point_count(handle_.get())};
+    }
+    /// Colours of the metric point cloud, sRGB. `[count][3]`
+    Span<const std::uint8_t> point_colors() const noexcept {
+        return {vg_report_point_colors(handle_.get()), 3 * vg_report_point_count(handle_.get())};
+    }
+
+    const vg_report *get() const noexcept { return handle_.get(); }
+    /// The handle, now the caller's to free.
+    vg_report *release() noexcept { return handle_.release(); }
+
+  private:
+    std::unique_ptr<vg_report, detail::Free> handle_;
+};
+
+/// A vehicle, and how it was made.
+struct Reconstruction {
+    Gaussians gaussians;
+    Report report;
+};
+
+/// Makes a complete vehicle of photographs of one side. The same views and options give the same bytes.
+inline Result<Reconstruction> reconstruct(const vg_view *views, std::size_t view_count,
+                                          const Options &options = {}) {
+    vg_options c_options = options;
+    if (options.on_progress) {
+        c_options.progress = detail::progress;
+        c_options.progress_user = detail::user_pointer(options.on_progress);
+    }
+    if (options.on_log) {
+        c_options.log = detail::log;
+        c_options.log_user = detail::user_pointer(options.on_log);
+    }
+    vg_report *report = nullptr;
+    Result<Gaussians> gaussians = detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
+        return vg_reconstruct(views, view_count, &c_options, out, &report, error);
+    });
+    if (!gaussians) {
+        return gaussians.error();
+    }
+    return Reconstruction{gaussians.take(), Report(report)};
+}
+
+inline Result<Reconstruction> reconstruct(const std::vector<vg_view> &views, const Options &options = {}) {
+    return reconstruct(views.data(), views.size(), options);
+}
+
+// ---- Pictures
+
+/// Settings of a picture.
+struct RenderOptions : vg_render_options {
+    RenderOptions() noexcept : vg_render_options{} {
+        vg_render_options_init(this, sizeof(vg_render_options));
+    }
+};
+
+/// Where a picture goes: the caller's memory.
+struct ImageTarget : vg_image_target {
+    ImageTarget() noexcept : vg_image_target{} { vg_image_target_init(this, sizeof(vg_image_target)); }
+};
+
+/// Colour and depth, rows without gaps, the top row first.
+struct Picture {
+    std::uint32_t width = 0;
+    std::uint32_t height = 0;
+    vg_format format = VG_FORMAT_RGBA8;
+    /// `[height][width][channels]`
+    std::vector<std::uint8_t> color;
+    /// Planar depth, metres; 0 where nothing is. `[height][width]`
+    std::vector<float> depth;
+};
+
+/// Draws Gaussians as a camera sees them into memory of the caller's.
+inline Result<void> render_into(const vg_image_target &target, const Gaussians &gaussians,
+                                const vg_camera &camera, const RenderOptions &options = {}) {
+    return detail::done(
+        [&](vg_error **error) { return vg_render(gaussians.get(), &camera, &options, &target, error); });
+}
+
+/// Draws Gaussians as a camera sees them. `format`: RGBA8 or BGRA8; RGB8 or BGR8 where the background is
+/// opaque.
+inline Result<Picture> render(const Gaussians &gaussians, const vg_camera &camera,
+                              const RenderOptions &options = {}, vg_format format = VG_FORMAT_RGBA8) {
+    std::size_t channels = 0;
+    switch (format) {
+    case VG_FORMAT_RGB8:
+    case VG_FORMAT_BGR8:
+        channels = 3;
+        break;
+    case VG_FORMAT_RGBA8:
+    case VG_FORMAT_BGRA8:
+        channels = 4;
+        break;
+    default:
+        return Error{VG_STATUS_ARGUMENT, "format: " + std::to_string(static_cast<std::int32_t>(format)) +
+                                             ", allowed: RGB8, BGR8, RGBA8, BGRA8"};
+    }
+    // A camera of no sensible size is the library's to refuse, before memory is asked for.
+    const bool sensible = camera.width <= 8192 && camera.height <= 8192;
+    const std::size_t pixels = sensible ? std::size_t{camera.width} * camera.height : 1;
+    Picture picture;
+    picture.width = camera.width;
+    picture.height = camera.height;
+    picture.format = format;
+    picture.color.resize(pixels * channels);
+    picture.depth.resize(pixels);
+    ImageTarget target;
+    target.width = camera.width;
+    target.height = camera.height;
+    target.color = picture.color.data();
+    target.color_format = format;
+    target.depth = picture.depth.data();
+    const Result<void> drawn = render_into(target, gaussians, camera, options);
+    if (!drawn) {
+        return drawn.error();
+    }
+    return picture;
+}
+
+// ---- OpenCV
+
+#ifdef VG_HAS_OPENCV
+
+namespace detail {
+
+/// "CV_8UC3"
+inline std::string type_name(int type) {
+    static constexpr const char *depths[8] = {"8U", "8S", "16U", "16S", "32S", "32F", "64F", "16F"};
+    return std::string("CV_") + depths[CV_MAT_DEPTH(type)] + "C" + std::to_string(CV_MAT_CN(type));
+}
+
+/// An error about a matrix: its size and type, and what is allowed.
+inline Error refused(const char *argument, const cv::Mat &mat, const std::string &allowed) {
+    const std::string size = mat.dims == 2 ? std::to_string(mat.cols) + "x" + std::to_string(mat.rows)
+                                           : std::to_string(mat.dims) + " dimensions";
+    return Error{VG_STATUS_ARGUMENT, std::string(argument) + ": " + size + " of " + type_name(mat.type()) +
+                                         ", allowed: " + allowed};
+}
+
+/// A type of matrix, and what we call its pixels.
+struct MatFormat {
+    int type;
+    vg_format format;
+};
+
+/// `mat` in the format that goes with its type. cv::imread leaves an empty one where it cannot read the file.
+template <std::size_t N>
+Result<vg_image> lent(const char *argument, const cv::Mat &mat, const MatFormat (&formats)[N],
+                      const char *allowed) {
+    if (mat.empty()) {
+        return Error{VG_STATUS_ARGUMENT, std::string(argument) + ": an empty cv::Mat, allowed: " + allowed};
+    }
+    for (const MatFormat &known : formats) {
+        if (mat.dims == 2 && mat.type() == known.type) {
+            return image(mat.data, static_cast<std::uint32_t>(mat.cols), static_cast<std::uint32_t>(mat.rows),
+                         known.format, mat.step);
+        }
+    }
+    return refused(argument, mat, allowed);
+}
+
+} // namespace detail
+
+/// A cv::Mat whose pixels are lent, not copied: a named one, which must outlive the view. A temporary is
+/// refused, because its pixels would be gone: give a region of a picture (`frame(box)`) a name first.
+class LentMat {
+  public:
+    LentMat(const cv::Mat &mat) noexcept : mat_(&mat) {}
+    LentMat(const cv::Mat &&) = delete;
+    const cv::Mat &get() const noexcept { return *mat_; }
+
+  private:
+    const cv::Mat *mat_;
+};
+
+/// A photograph: CV_8UC3 is BGR, CV_8UC4 is BGRA, CV_8UC1 is gray, as OpenCV has them. Regions of larger
+/// pictures too. Pixels are not copied.
+inline Result<vg_image> image(LentMat mat) {
+    static constexpr detail::MatFormat formats[] = {
+        {CV_8UC3, VG_FORMAT_BGR8}, {CV_8UC4, VG_FORMAT_BGRA8}, {CV_8UC1, VG_FORMAT_GRAY8}};
+    return detail::lent("image", mat.get(), formats, "CV_8UC3 (BGR), CV_8UC4 (BGRA), CV_8UC1 (gray)");
+}
+
+/// A photograph whose channels were put into another order: RGB8 or RGBA8.
+inline Result<vg_image> image_rgb(LentMat mat) {
+    static constexpr detail::MatFormat formats[] = {{CV_8UC3, VG_FORMAT_RGB8}, {CV_8UC4, VG_FORMAT_RGBA8}};
+    return detail::lent("image", mat.get(), formats, "CV_8UC3 (RGB), CV_8UC4 (RGBA)");
+}
+
+/// A mask: 128 and above is vehicle.
+inline Result<vg_image> mask(LentMat mat) {
+    static constexpr detail::MatFormat formats[] = {{CV_8UC1, VG_FORMAT_GRAY8}};
+    return detail::lent("mask", mat.get(), formats, "CV_8UC1, 128 and above is vehicle");
+}
+
+/// Planar depth in metres.
+inline Result<vg_image> depth(LentMat mat) {
+    static constexpr detail::MatFormat formats[] = {{CV_32FC1, VG_FORMAT_DEPTH32F}};
+    return detail::lent("depth", mat.get(), formats,
+                        "CV_32FC1 in metres (of millimetres: mat.convertTo(metres, CV_32F, 0.001))");
+}
+
+/// A photograph with its camera; its alpha is the mask. The matrix must outlive the view.
+inline Result<vg_view> view(LentMat photograph, const vg_camera &camera) {
+    const Result<vg_image> pixels = image(photograph);
+    if (!pixels) {
+        return pixels.error();
+    }
+    return view(*pixels, vg_image{}, camera);
+}
+
+/// A photograph with its mask and its camera. The matrices must outlive the view.
+inline Result<vg_view> view(LentMat photograph, LentMat vehicle_mask, const vg_camera &camera) {
+    const Result<vg_image> pixels = image(photograph);
+    const Result<vg_image> labels = mask(vehicle_mask);
+    if (!pixels || !labels) {
+        return pixels ? labels.error() : pixels.error();
+    }
+    return view(*pixels, *labels, camera);
+}
+
+/// The same with depth in metres.
+inline Result<vg_view> view(LentMat photograph, LentMat vehicle_mask, LentMat metres,
+                            const vg_camera &camera) {
+    Result<vg_view> made = view(photograph, vehicle_mask, camera);
+    const Result<vg_image> measured = depth(metres);
+    if (!measured) {
+        return measured.error();
+    }
+    if (made) {
+        made->depth = *measured;
+    }
+    return made;
+}
+
+/// OpenCV's calibration as cv::calibrateCamera leaves it: the 3x3 camera matrix, and a row or column of
+/// distortion.
+inline Result<vg_camera> camera_from_opencv(const cv::Mat &k, const cv::Mat &distortion, Lens lens,
+                                            cv::Size size, const Pose &vehicle_from_camera = identity_pose) {
+    if (k.dims != 2 || k.rows != 3 || k.cols != 3 || k.channels() != 1) {
+        return detail::refused("k", k, "3x3 of CV_64FC1 or CV_32FC1");
+    }
+    if (!distortion.empty() && (distortion.dims != 2 || (distortion.rows != 1 && distortion.cols != 1) ||
+                                distortion.channels() != 1)) {
+        return detail::refused("distortion", distortion, "one row or column of CV_64FC1 or CV_32FC1");
+    }
+    if (size.width < 0 || size.height < 0) {
+        return Error{VG_STATUS_ARGUMENT, "size: " + std::to_string(size.width) + "x" +
+                                             std::to_string(size.height) + ", allowed: 1x1 to 8192x8192"};
+    }
+    cv::Mat matrix, row;
+    k.convertTo(matrix, CV_64F);
+    distortion.convertTo(row, CV_64F);
+    std::array<double, 9> numbers{};
+    for (int i = 0; i < 9; i++) {
+        numbers[static_cast<std::size_t>(i)] = matrix.at<double>(i / 3, i % 3);
+    }
+    std::vector<double> coefficients;
+    for (int i = 0; i < row.rows * row.cols; i++) {
+        coefficients.push_back(row.rows == 1 ? row.at<double>(0, i) : row.at<double>(i, 0));
+    }
+    return camera_from_opencv(numbers, coefficients, lens, static_cast<std::uint32_t>(size.width),
+                              static_cast<std::uint32_t>(size.height), vehicle_from_camera);
+}
+
+namespace detail {
+
+/// Draws into matrices of the camera's size, or makes them where they are empty. `depth`: NULL: none.
+inline Result<void> render_mats(cv::Mat &color, cv::Mat *depth, const Gaussians &gaussians,
+                                const vg_camera &camera, const RenderOptions &options) {
+    const bool opaque = options.background != VG_BACKGROUND_TRANSPARENT;
+    const int columns = static_cast<int>(camera.width), rows = static_cast<int>(camera.height);
+    const std::string size = std::to_string(camera.width) + "x" + std::to_string(camera.height);
+    if (camera.width > 8192 || camera.height > 8192 || columns == 0 || rows == 0) {
+        return Error{VG_STATUS_ARGUMENT, "camera: " + size + ", allowed: 1x1 to 8192x8192"};
+    }
+    const auto fits = [&](const cv::Mat &mat) {
+        return mat.dims == 2 && mat.cols == columns && mat.rows == rows;
+    };
+    if (!color.empty() &&
+        (!fits(color) || !(color.type() == CV_8UC4 || (opaque && color.type() == CV_8UC3)))) {
+        return refused("color", color,
+                       size + " of " + (opaque ? "CV_8UC3 or CV_8UC4" : "CV_8UC4") + ", or empty");
+    }
+    if (depth != nullptr && !depth->empty() && (!fits(*depth) || depth->type() != CV_32FC1)) {
+        return refused("depth", *depth, size + " of CV_32FC1, or empty");
+    }
+    // The caller's stay as they are until the picture is there.
+    cv::Mat picture = color.empty() ? cv::Mat(rows, columns, opaque ? CV_8UC3 : CV_8UC4) : color;
+    cv::Mat metres;
+    if (depth != nullptr) {
+        metres = depth->empty() ? cv::Mat(rows, columns, CV_32FC1) : *depth;
+    }
+    ImageTarget target;
+    target.width = camera.width;
+    target.height = camera.height;
+    target.color = picture.data;
+    target.color_row_stride = picture.step;
+    target.color_format = picture.type() == CV_8UC3 ? VG_FORMAT_BGR8 : VG_FORMAT_BGRA8;
+    if (depth != nullptr) {
+        target.depth = metres.data;
+        target.depth_row_stride = metres.step;
+    }
+    const Result<void> drawn = vg::render_into(target, gaussians, camera, options);
+    if (drawn) {
+        color = picture;
+        if (depth != nullptr) {
+            *depth = metres;
+        }
+    }
+    return drawn;
+}
+
+} // namespace detail
+
+/// Draws into a matrix, which may be a region of a larger one: CV_8UC3 (BGR) or CV_8UC4 (BGRA) of the
+/// camera's size. An empty one becomes CV_8UC3, or CV_8UC4 where the background is transparent.
+inline Result<void> render_into(cv::Mat &color, const Gaussians &gaussians, const vg_camera &camera,
+                                const RenderOptions &options = {}) {
+    return detail::render_mats(color, nullptr, gaussians, camera, options);
+}
+
+/// The same with planar depth in metres: CV_32FC1 of the camera's size, or empty.
+inline Result<void> render_into(cv::Mat &color, cv::Mat &depth, const Gaussians &gaussians,
+                                const vg_camera &camera, const RenderOptions &options = {}) {
+    return detail::render_mats(color, &depth, gaussians, camera, options);
+}
+
+#endif // VG_HAS_OPENCV
+
+// ---- Eigen
+
+#ifdef VG_HAS_EIGEN
+
+/// A pose from the top rows of a 3x4 or 4x4 matrix of any storage order.
+template <class Derived> Pose pose(const Eigen::MatrixBase<Derived> &vehicle_from_camera) {
+    static_assert(Derived::ColsAtCompileTime == 4 &&
+                      (Derived::RowsAtCompileTime == 3 || Derived::RowsAtCompileTime == 4),
+                  "a pose is 3x4 or 4x4");
+    Pose pose{};
+    for (int row = 0; row < 3; row++) {
+        for (int column = 0; column < 4; column++) {
+            pose[static_cast<std::size_t>(4 * row + column)] =
+                static_cast<double>(vehicle_from_camera(row, column));
+        }
+    }
+    return pose;
+}
+
+/// A pose from Eigen::Isometry3d, Affine3d and their like.
+template <class Scalar, int Mode, int Storage>
+Pose pose(const Eigen::Transform<Scalar, 3, Mode, Storage> &vehicle_from_camera) {
+    return pose(vehicle_from_camera.matrix());
+}
+
+/// A pose from a rotation and the camera's position.
+template <class Scalar>
+Pose pose(const Eigen::Matrix<Scalar, 3, 3> &rotation, const Eigen::Matrix<Scalar, 3, 1> &position) {
+    Eigen::Matrix<Scalar, 3, 4> both;
+    both << rotation, position;
+    return pose(both);
+}
+
+/// A pose from a unit quaternion and the camera's position.
+template <class Scalar>
+Pose pose(const Eigen::Quaternion<Scalar> &rotation, const Eigen::Matrix<Scalar, 3, 1> &position) {
+    return pose(Eigen::Matrix<Scalar, 3, 3>(rotation.toRotationMatrix()), position);
+}
+
+/// A similarity from a 4x4 matrix of any storage order.
+template <class Derived> Similarity similarity(const Eigen::MatrixBase<Derived> &to_from) {
+    static_assert(Derived::ColsAtCompileTime == 4 && Derived::RowsAtCompileTime == 4, "a similarity is 4x4");
+    Similarity similarity{};
+    for (int row = 0; row < 4; row++) {
+        for (int column = 0; column < 4; column++) {
+            similarity[static_cast<std::size_t>(4 * row + column)] =
+                static_cast<double>(to_from(row, column));
+        }
+    }
+    return similarity;
+}
+
+/// Where a camera stands.
+inline Eigen::Isometry3d isometry(const vg_camera &camera) {
+    Eigen::Isometry3d isometry = Eigen::Isometry3d::Identity();
+    for (int row = 0; row < 3; row++) {
+        for (int column = 0; column < 4; column++) {
+            isometry(row, column) = camera.vehicle_from_camera[4 * row + column];
+        }
+    }
+    return isometry;
+}
+
+/// An array as a matrix of one row per element, not copied: `vg::rows<3>(car.positions())`.
+template <int Columns, class T>
+Eigen::Map<const Eigen::Matrix<T, Eigen::Dynamic, Columns, Columns == 1 ? Eigen::ColMajor : Eigen::RowMajor>>
+rows(const Span<const T> &array) {
+    return {array.data(), static_cast<Eigen::Index>(array.size() / Columns), Columns};
+}
+
+#endif // VG_HAS_EIGEN
+
+} // namespace vg
+
+#endif // VG_HPP

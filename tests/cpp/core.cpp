@@ -1,0 +1,260 @@
+// vg.hpp without other libraries: results, ownership, callbacks, errors. Prints nothing where all is well.
+//
+//     core SCRATCH_FOLDER
+#include <csignal>
+#include <cstring>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <sys/wait.h>
+#include <unistd.h>
+#if __cplusplus >= 202002L
+#include <span>
+#endif
+
+#include "vg_test.hpp"
+
+// In another file of the same program.
+std::size_t size_seen_by_the_other_file(const vg::Gaussians &gaussians);
+
+namespace {
+
+template <class T>
+constexpr bool only_moves =
+    std::is_nothrow_move_constructible_v<T> && std::is_nothrow_move_assignable_v<T> &&
+    std::is_nothrow_default_constructible_v<T> && !std::is_copy_constructible_v<T> &&
+    !std::is_copy_assignable_v<T>;
+static_assert(only_moves<vg::Context> && only_moves<vg::Scene> && only_moves<vg::Gaussians> &&
+              only_moves<vg::Report>);
+static_assert(!std::is_convertible_v<vg::Result<int>, bool>, "a Result is a condition, not a number");
+static_assert(!std::is_convertible_v<vg_gaussians *, vg::Gaussians>, "taking a handle over is written down");
+
+struct Photographs {
+    std::vector<std::uint8_t> rgb = ball_rgb();
+    std::vector<std::uint8_t> mask = ball_mask();
+    std::vector<float> metres = ball_depth();
+
+    vg_view view() const {
+        return vg::view(vg::image(rgb.data(), side, side, VG_FORMAT_RGB8),
+                        vg::image(mask.data(), side, side, VG_FORMAT_GRAY8), camera_at_right(),
+                        vg::image(metres.data(), side, side, VG_FORMAT_DEPTH32F), "ball");
+    }
+};
+
+void results_hold_a_value_or_an_error() {
+    vg::Result<std::string> text(std::string("text"));
+    CHECK(text.ok() && text && *text == "text" && text->size() == 4 && text.value() == "text");
+    const std::string taken = text.take();
+    CHECK(taken == "text");
+
+    const vg::Result<std::string> none(vg::Error{VG_STATUS_IO, "gone"});
+    CHECK(!none.ok() && !none && none.error().status == VG_STATUS_IO && none.error().message == "gone");
+
+    const vg::Result<void> done;
+    CHECK(done.ok() && done);
+    done.take();
+    CHECK(failed(vg::Result<void>(vg::Error{VG_STATUS_FORMAT, "odd"}), VG_STATUS_FORMAT, "odd"));
+}
+
+/// How a program ends that takes a value which is not there.
+void taking_what_is_not_there_ends_the_program() {
+    const pid_t child = fork();
+    if (child == 0) {
+        CHECK(std::freopen("/dev/null", "w", stderr) != nullptr);
+        vg::Result<vg::Gaussians> none(vg::Error{VG_STATUS_IO, "gone"});
+        const vg::Gaussians taken = none.take();
+        std::exit(0);
+    }
+    int status = 0;
+    CHECK(child > 0 && waitpid(child, &status, 0) == child);
+    CHECK(WIFSIGNALED(status) && WTERMSIG(status) == SIGABRT);
+}
+
+void handles_move_and_leave_nothing_behind() {
+    vg::Context first = vg::Context::make(2).take();
+    CHECK(first.threads() == 2 && first.get() != nullptr);
+    vg::Context second = std::move(first);
+    CHECK(second.threads() == 2 && first.get() == nullptr && first.threads() == 0);
+    first = std::move(second);
+    CHECK(first.threads() == 2 && second.get() == nullptr);
+    const vg::Context owned(first.release());
+    CHECK(owned.threads() == 2 && first.get() == nullptr);
+    CHECK(failed(vg::Context::make(100000), VG_STATUS_ARGUMENT, "threads"));
+}
+
+void what_is_empty_is_harmless() {
+    const vg::Gaussians none;
+    CHECK(none.empty() && none.sh_degree() == 0 && none.positions().empty() && none.sh().empty());
+    CHECK(none.positions().begin() == none.positions().end());
+    CHECK(failed(none.mirrored(), VG_STATUS_ARGUMENT, "gaussians"));
+    CHECK(failed(none.save_ply("nowhere.ply"), VG_STATUS_ARGUMENT, "gaussians"));
+    CHECK(failed(vg::render(none, camera_at_right()), VG_STATUS_ARGUMENT, "gaussians"));
+    const vg::Report report;
+    CHECK(report.figures().gaussian_count == 0 && std::strlen(report.json()) == 0 &&
+          report.point_colors().empty());
+    const vg::Scene scene;
+    CHECK(scene.size() == 0 && scene.views()->empty());
+    CHECK(failed(scene.view(0), VG_STATUS_ARGUMENT, "scene"));
+    CHECK(failed(vg::reconstruct({}), VG_STATUS_ARGUMENT, "view"));
+}
+
+void cameras_are_made_moved_scaled_and_cropped() {
+    const vg_camera camera = vg::pinhole(100, 110, 31.5, 24, 63, 48).take();
+    CHECK(camera.struct_size == sizeof(vg_camera) && camera.params[1] == 110);
+    const auto pixel = vg::project(camera, {0.5, -0.25, 2}).take();
+    CHECK(pixel[0] == 100 * 0.25 + 31.5 && pixel[1] == 110 * -0.125 + 24);
+    CHECK(failed(vg::project(camera, {0, 0, -1}), VG_STATUS_ARGUMENT, "point"));
+    CHECK(vg::placed(camera, pose_at_right()).vehicle_from_camera[7] == -4);
+    CHECK(vg::scaled(camera, 126, 96)->params[0] == 200);
+    CHECK(vg::cropped(camera, 10, 8, 20, 16)->params[2] == 21.5);
+    CHECK(failed(vg::cropped(camera, 60, 0, 20, 16), VG_STATUS_ARGUMENT, "allowed"));
+    CHECK(failed(vg::pinhole(100, 110, 31.5, 24, 0, 48), VG_STATUS_ARGUMENT, "0x48"));
+    CHECK(failed(vg::camera_from_colmap(9, {1, 2, 3}, 63, 48), VG_STATUS_ARGUMENT, "model"));
+
+    const std::array<double, 9> k{100, 0, 31, 0, 110, 23.5, 0, 0, 1};
+    const vg_camera opencv = vg::camera_from_opencv(k, {}, vg::Lens::Standard, 63, 48).take();
+    CHECK(std::memcmp(opencv.params, camera.params, sizeof camera.params) == 0);
+    CHECK(vg::camera_from_opencv(k, {0.1, 0.01, 0, 0}, vg::Lens::Fisheye, 63, 48)->model ==
+          VG_CAMERA_MODEL_OPENCV_FISHEYE);
+
+    const vg::Similarity doubled{2, 0, 0, 1, 0, 2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1};
+    CHECK(vg::pose_from_colmap({1, 0, 0, 0}, {1, 2, 3}).value()[11] == -3);
+    CHECK(vg::pose_from_colmap({1, 0, 0, 0}, {1, 2, 3}, &doubled).value()[3] == -1);
+    CHECK(vg::pose_from_opengl(vg::identity_pose).value()[5] == -1);
+    CHECK(vg::pose_from_box(vg::identity_pose, pose_at_right()).value() == pose_at_right());
+    CHECK(failed(vg::pose_from_colmap({0, 0, 0, 0}, {1, 2, 3}), VG_STATUS_ARGUMENT, "qvec"));
+}
+
+vg::Reconstruction ball() {
+    const Photographs photographs;
+    std::vector<std::string> stages;
+    std::vector<std::string> lines;
+    vg::Options options;
+    options.points = 1;
+    options.on_progress = [&](const char *stage, double fraction) {
+        CHECK(fraction >= 0 && fraction <= 1);
+        stages.emplace_back(stage);
+        return vg::Flow::Continue;
+    };
+    options.on_log = [&](vg_log_level level, const char *line) {
+        CHECK(level >= VG_LOG_LEVEL_WARNING && level <= VG_LOG_LEVEL_DEBUG);
+        lines.emplace_back(line);
+    };
+    vg::Reconstruction made = vg::reconstruct({photographs.view()}, options).take();
+    CHECK(!stages.empty() && !lines.empty());
+    CHECK(made.report.figures().gaussian_count == made.gaussians.size());
+    CHECK(made.report.figures().prior == VG_PRIOR_GIVEN);
+    CHECK(std::strstr(made.report.json(), "ball") != nullptr);
+    CHECK(made.report.point_positions().size() == made.report.point_colors().size());
+    CHECK(!made.report.point_positions().empty());
+    return made;
+}
+
+void callbacks_stop_a_reconstruction() {
+    const Photographs photographs;
+    int calls = 0;
+    vg::Options options;
+    options.on_progress = [&calls](const char *, double) {
+        calls++;
+        return calls == 2 ? vg::Flow::Cancel : vg::Flow::Continue;
+    };
+    CHECK(failed(vg::reconstruct({photographs.view()}, options), VG_STATUS_CANCELLED, ""));
+    CHECK(calls == 2);
+}
+
+void errors_name_the_argument() {
+    const Photographs photographs;
+    vg_view view = photographs.view();
+    view.mask.width = 7;
+    CHECK(failed(vg::reconstruct({view}), VG_STATUS_ARGUMENT, "views[0] (ball).mask"));
+    vg::Options options;
+    options.sh_degree = 7;
+    CHECK(failed(vg::reconstruct({photographs.view()}, options), VG_STATUS_ARGUMENT, "sh_degree"));
+    CHECK(failed(vg::Gaussians::load_ply("/nowhere.ply"), VG_STATUS_IO, "/nowhere.ply"));
+    CHECK(failed(vg::Scene::open_transforms("/nowhere"), VG_STATUS_IO, "/nowhere"));
+    vg::SceneOptions scene_options;
+    scene_options.view_names = {"000"};
+    CHECK(failed(vg::Scene::open_colmap("/nowhere", scene_options), VG_STATUS_IO, "/nowhere"));
+}
+
+void gaussians_are_saved_derived_and_made_of_arrays(const vg::Gaussians &car, const std::string &scratch) {
+    CHECK(car.positions().size() == 3 * car.size() && car.rotations().size() == 4 * car.size());
+    CHECK(car.scales()[0] > 0 && car.opacities().size() == car.size());
+    CHECK(size_seen_by_the_other_file(car) == car.size());
+#if __cplusplus >= 202002L
+    const std::span<const float> positions = car.positions();
+    CHECK(positions.data() == car.positions().data() && positions.size() == 3 * car.size());
+#endif
+    const vg::Gaussians twice = car.mirrored().take().mirrored().take();
+    CHECK(same(car, twice));
+    CHECK(car.merged(twice)->size() == 2 * car.size());
+    const vg::Similarity raised{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 10, 0, 0, 0, 1};
+    CHECK(car.transformed(raised)->positions()[2] > 8);
+
+    CHECK(car.save_ply(scratch + "/ball.ply").ok());
+    CHECK(vg::Gaussians::load_ply(scratch + "/ball.ply")->size() == car.size());
+
+    vg::GaussianArrays arrays;
+    arrays.count = car.size();
+    arrays.sh_degree = car.sh_degree();
+    arrays.positions = car.positions().data();
+    arrays.scales = car.scales().data();
+    arrays.rotations = car.rotations().data();
+    arrays.opacities = car.opacities().data();
+    arrays.sh = car.sh().data();
+    CHECK(vg::Gaussians::from_arrays(arrays)->size() == car.size());
+    arrays.sh = nullptr;
+    CHECK(failed(vg::Gaussians::from_arrays(arrays), VG_STATUS_ARGUMENT, "sh"));
+}
+
+void pictures_own_their_pixels(const vg::Gaussians &car) {
+    const vg_camera camera = camera_at_right();
+    const vg::Picture rgb = vg::render(car, camera, {}, VG_FORMAT_RGB8).take();
+    CHECK(rgb.width == side && rgb.height == side && rgb.color.size() == side * side * 3);
+    const std::size_t centre = side / 2 * side + side / 2;
+    CHECK(rgb.color[3 * centre] > 150 && rgb.color[3 * centre + 2] < 120 && rgb.color[0] == 255);
+    CHECK(rgb.depth[centre] > 2 && rgb.depth[centre] < 4 && !(rgb.depth[0] > 0));
+
+    vg::RenderOptions options;
+    options.background = VG_BACKGROUND_TRANSPARENT;
+    const vg::Picture bgra = vg::render(car, camera, options, VG_FORMAT_BGRA8).take();
+    CHECK(bgra.color[4 * centre] < 120 && bgra.color[4 * centre + 2] > 150);
+    CHECK(bgra.color[4 * centre + 3] > 200 && bgra.color[3] == 0);
+    CHECK(failed(vg::render(car, camera, options, VG_FORMAT_RGB8), VG_STATUS_ARGUMENT, "color_format"));
+    CHECK(failed(vg::render(car, camera, {}, VG_FORMAT_GRAY8), VG_STATUS_ARGUMENT, "format"));
+    vg_camera odd = camera;
+    odd.width = 4000000000;
+    odd.height = 4000000000;
+    CHECK(failed(vg::render(car, odd), VG_STATUS_ARGUMENT, "4000000000"));
+
+    const vg::Context context = vg::Context::make(1).take();
+    vg::RenderOptions with_context;
+    with_context.context = context.get();
+    std::vector<float> metres(side * side);
+    vg::ImageTarget target;
+    target.width = side;
+    target.height = side;
+    target.depth = metres.data();
+    CHECK(vg::render_into(target, car, camera, with_context).ok());
+    CHECK(metres == rgb.depth);
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+    CHECK(argc == 2);
+    CHECK(std::string(vg::version()).find('.') != std::string::npos);
+    results_hold_a_value_or_an_error();
+    taking_what_is_not_there_ends_the_program();
+    handles_move_and_leave_nothing_behind();
+    what_is_empty_is_harmless();
+    cameras_are_made_moved_scaled_and_cropped();
+    callbacks_stop_a_reconstruction();
+    errors_name_the_argument();
+    const vg::Reconstruction made = ball();
+    gaussians_are_saved_derived_and_made_of_arrays(made.gaussians, argv[1]);
+    pictures_own_their_pixels(made.gaussians);
+    return 0;
+}
