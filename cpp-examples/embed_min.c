@@ -29,6 +29,10 @@ int main(int argc, char **argv) {
     }
     const size_t count = strtoul(argv[2], NULL, 10);
     must(vg_transforms_open(argv[1], NULL, &scene, &error), error);
+    if (count < 1 || count >= vg_scene_view_count(scene)) {
+        fprintf(stderr, "embed_min: COUNT: %s; allowed: 1 to %zu\n", argv[2], vg_scene_view_count(scene) - 1);
+        return 2;
+    }
 
     /* A view: photograph, mask, depth where there is one, lens and pose. Here it points into the scene; it
      * could as well point to a camera driver's memory. */

@@ -2,8 +2,8 @@
 //! judged by the pictures they draw of the side that was not photographed. And `vg.hpp`, under every compiler
 //! there is.
 //!
-//! The library is built once, optimised, in `target/cmake`. What this machine lacks is skipped with a printed
-//! reason; `VG_NO_SKIP=1` makes it a failure.
+//! The library is built once, optimised, in `target`, where the demo is built too. What this machine lacks is
+//! skipped with a printed reason; `VG_NO_SKIP=1` makes it a failure.
 
 #![cfg(target_os = "linux")]
 
@@ -38,7 +38,7 @@ impl Package {
         let folder = scratch();
         let (build, installed) = (folder.path().join("build"), folder.path().join("installed"));
         // target/debug/deps -> target
-        let cargo_target = target().parent().unwrap().parent().unwrap().join("cmake");
+        let cargo_target = target().parent().unwrap().parent().unwrap().to_owned();
         let mut configure = cmake();
         configure.arg("-S").arg(root()).arg("-B").arg(&build);
         configure.arg(define("VG_CARGO_TARGET_DIR", &cargo_target));
