@@ -45,6 +45,16 @@ pub enum Error {
         /// Why, and what would help.
         reason: String,
     },
+    /// What was asked for exists, but this build of the library was made without it.
+    #[error("{argument}: {found} is not in this build; {remedy}")]
+    NotBuilt {
+        /// The argument that asked for it.
+        argument: String,
+        /// What was asked for.
+        found: String,
+        /// How to get it, or what to ask for instead.
+        remedy: String,
+    },
     /// The progress callback asked to stop.
     #[error("cancelled during {stage}")]
     Cancelled {

@@ -13,6 +13,7 @@
 
 #![warn(unreachable_pub)]
 
+pub mod capi;
 pub mod error;
 pub mod gaussians;
 pub mod geometry;

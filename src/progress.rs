@@ -1,4 +1,4 @@
-//! How long work runs: on the caller's threads' budget, with a progress callback that may cancel.
+//! How work runs: on threads that the caller started, with a progress callback that may cancel.
 
 use crate::error::{Error, Result};
 use std::cell::RefCell;
@@ -16,39 +16,66 @@ pub struct Progress {
 /// Called on the caller's own thread at every stage boundary and inside the long ones; `Break` cancels.
 pub type ProgressCallback<'a> = dyn FnMut(Progress) -> ControlFlow<()> + 'a;
 
-/// What every stage is given: a thread pool of its own and the progress callback.
-pub struct Context<'a> {
+/// Worker threads of the caller's own, started once and used by any number of calls, one after another or at
+/// the same time. They end when this is dropped.
+#[derive(Debug)]
+pub struct Threads {
     pool: rayon::ThreadPool,
-    callback: RefCell<&'a mut ProgressCallback<'a>>,
 }
 
-impl<'a> Context<'a> {
-    /// With `threads` worker threads; 0 means one per core.
-    pub fn new(threads: usize, callback: &'a mut ProgressCallback<'a>) -> Result<Self> {
+/// What the names of worker threads begin with.
+pub const THREAD_NAME: &str = "vg-";
+
+impl Threads {
+    /// Starts `count` worker threads; 0 means one per core.
+    pub fn new(count: usize) -> Result<Self> {
         const MAX_THREADS: usize = 1024;
-        if threads > MAX_THREADS {
+        if count > MAX_THREADS {
             return Err(Error::argument(
                 "threads",
-                threads.to_string(),
+                count.to_string(),
                 format!("0 (all cores) to {MAX_THREADS}"),
             ));
         }
         let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .thread_name(|i| format!("vg-{i}"))
+            .num_threads(count)
+            .thread_name(|i| format!("{THREAD_NAME}{i}"))
             .build()
             .map_err(|e| Error::argument("threads", e.to_string(), "a number the system can start"))?;
-        Ok(Self { pool, callback: RefCell::new(callback) })
+        Ok(Self { pool })
     }
 
-    /// Worker threads.
-    pub fn threads(&self) -> usize {
+    /// How many.
+    pub fn count(&self) -> usize {
         self.pool.current_num_threads()
     }
 
-    /// Runs `work` on the pool: rayon inside it uses these threads and no others.
-    pub fn parallel<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+    /// Runs `work` on these threads: rayon inside it uses them and no others.
+    pub fn run<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         self.pool.install(work)
+    }
+}
+
+/// What every stage is given: worker threads and the progress callback.
+pub struct Context<'a> {
+    threads: &'a Threads,
+    callback: RefCell<&'a mut ProgressCallback<'a>>,
+}
+
+impl<'a> Context<'a> {
+    /// For one run on these threads.
+    pub fn new(threads: &'a Threads, callback: &'a mut ProgressCallback<'a>) -> Self {
+        Self { threads, callback: RefCell::new(callback) }
+    }
+
+    /// How many worker threads.
+    pub fn threads(&self) -> usize {
+        self.threads.count()
+    }
+
+    /// Runs `work` on the worker threads: rayon inside it uses these and no others.
+    pub fn parallel<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        self.threads.run(work)
     }
 
     /// Tells the caller where the run stands; an error if the caller wants it to stop.

@@ -6,14 +6,14 @@ use common::vehicle::{HALF, camera, right_side, view, without_depth};
 use std::ops::ControlFlow;
 use vg::pipeline::{Options, PriorChoice, Reconstruction, reconstruct};
 use vg::prior::{DepthPrior, Geometry, HullPrior};
-use vg::progress::Context;
+use vg::progress::{Context, Threads};
 use vg::scene::mask::Label;
 use vg::scene::{Mask, Scene, View};
 
 fn estimate(scene: &Scene, size: Option<[f64; 3]>) -> Geometry {
     let mut proceed = |_| ControlFlow::Continue(());
-    let context = Context::new(2, &mut proceed).unwrap();
-    HullPrior { size }.estimate(&scene.views, &context).unwrap()
+    let threads = Threads::new(2).unwrap();
+    HullPrior { size }.estimate(&scene.views, &Context::new(&threads, &mut proceed)).unwrap()
 }
 
 /// Depth of the hull minus true depth, pixel by pixel, for view i.

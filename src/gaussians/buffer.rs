@@ -36,6 +36,14 @@ pub struct Gaussian {
     pub sh0: [f32; 3],
 }
 
+/// All but the opacities: what mirroring and moving change, keeping the invariants.
+pub(super) struct MovedArrays<'a> {
+    pub(super) means: &'a mut [[f32; 3]],
+    pub(super) rotations: &'a mut [[f32; 4]],
+    pub(super) scales: &'a mut [[f32; 3]],
+    pub(super) sh: &'a mut [f32],
+}
+
 impl Gaussians {
     /// None yet, with room for `capacity`, colour of SH degree `sh_degree` (0 to 3).
     pub fn with_capacity(sh_degree: u8, capacity: usize) -> Self {
@@ -151,6 +159,21 @@ impl Gaussians {
         self.sh.extend_from_slice(&other.sh);
     }
 
+    /// These, then those of `other`, at the higher of their SH degrees; missing bands are zero, which shows the same
+    /// colours.
+    pub fn merged(&self, other: &Self) -> Self {
+        let mut out = Self::with_capacity(self.sh_degree.max(other.sh_degree), self.len() + other.len());
+        let stride = out.sh_stride();
+        for part in [self, other] {
+            out.means.extend_from_slice(&part.means);
+            out.rotations.extend_from_slice(&part.rotations);
+            out.scales.extend_from_slice(&part.scales);
+            out.opacities.extend_from_slice(&part.opacities);
+            append_padded(&mut out.sh, &part.sh, part.sh_stride(), stride);
+        }
+        out
+    }
+
     /// Drops those without `keep[index]`, in place, keeping the order.
     pub fn retain(&mut self, keep: &[bool]) {
         assert_eq!(keep.len(), self.len(), "one flag per Gaussian");
@@ -181,9 +204,14 @@ impl Gaussians {
         }
     }
 
-    /// The arrays that mirroring changes: means, rotations, SH.
-    pub(super) fn arrays_mut(&mut self) -> (&mut [[f32; 3]], &mut [[f32; 4]], &mut [f32]) {
-        (&mut self.means, &mut self.rotations, &mut self.sh)
+    /// The arrays that a move changes.
+    pub(super) fn moved_arrays_mut(&mut self) -> MovedArrays<'_> {
+        MovedArrays {
+            means: &mut self.means,
+            rotations: &mut self.rotations,
+            scales: &mut self.scales,
+            sh: &mut self.sh,
+        }
     }
 
     /// Appends a copy of those with `which[index]`, in order.
@@ -294,6 +322,17 @@ fn append_runs<T: Copy>(values: &mut Vec<T>, runs: &[Range<usize>], stride: usiz
     }
 }
 
+/// Copies pieces of `stride` values to the end, each filled up with zeros to `padded` values.
+fn append_padded(values: &mut Vec<f32>, pieces: &[f32], stride: usize, padded: usize) {
+    if stride == padded {
+        return values.extend_from_slice(pieces);
+    }
+    for piece in pieces.chunks_exact(stride) {
+        values.extend_from_slice(piece);
+        values.resize(values.len() + padded - stride, 0.0);
+    }
+}
+
 /// The runs, one after the other.
 fn gather<T: Copy>(values: &[T], runs: &[Range<usize>], stride: usize) -> Vec<T> {
     let mut out = Vec::with_capacity(runs.iter().map(|r| r.len() * stride).sum());
@@ -345,6 +384,38 @@ mod tests {
             assert_eq!(retained.means()[k], all.means()[i]);
             assert_eq!(retained.sh()[k * 12..][..12], all.sh()[i * 12..][..12]);
         }
+    }
+
+    #[test]
+    fn merging_keeps_the_order_and_fills_the_missing_bands_with_zeros() {
+        let unit = [1.0, 0.0, 0.0, 0.0];
+        let low = one(unit, [0.1; 3], 0.3).unwrap();
+        let sh: Vec<f32> = (1..=12).map(|v| v as f32).collect();
+        let high =
+            Gaussians::from_arrays(1, vec![[1.0; 3]], vec![unit], vec![[0.2; 3]], vec![0.7], sh.clone())
+                .unwrap();
+        let both = low.merged(&high);
+        assert_eq!((both.len(), both.sh_degree()), (2, 1));
+        assert_eq!(both.means(), [[0.0; 3], [1.0; 3]]);
+        assert_eq!(
+            (both.scales(), both.opacities()),
+            ([[0.1; 3], [0.2; 3]].as_slice(), [0.3, 0.7].as_slice())
+        );
+        assert_eq!(both.sh(), [[0.0; 12].as_slice(), sh.as_slice()].concat());
+        let swapped = high.merged(&low);
+        assert_eq!(swapped.sh(), [sh.as_slice(), [0.0; 12].as_slice()].concat());
+        assert_eq!(swapped.opacities(), [0.7, 0.3]);
+    }
+
+    #[test]
+    fn merging_with_none_returns_the_same_bytes_and_merging_equals_appending() {
+        let some = one([0.5; 4], [0.1; 3], 0.3).unwrap();
+        let none = Gaussians::default();
+        assert_eq!(some.merged(&none), some);
+        assert_eq!(none.merged(&some), some);
+        let mut appended = some.clone();
+        appended.append(&some);
+        assert_eq!(some.merged(&some), appended);
     }
 
     #[test]

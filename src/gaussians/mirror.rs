@@ -4,7 +4,7 @@
 //! -1 and is no rotation; since S S^T is diagonal, M R M gives the same Sigma~ and is one: the quaternion
 //! (w, x, y, z) becomes (w, -x, y, -z). Colour: exactly the SH functions that are odd in y change sign.
 
-use super::buffer::Gaussians;
+use super::buffer::{Gaussians, MovedArrays};
 use super::sh;
 use rayon::prelude::*;
 
@@ -34,7 +34,7 @@ impl Gaussians {
         const CHUNK: usize = 1 << 13;
         let (degree, stride) = (self.sh_degree(), self.sh_stride());
         let signs = sh_signs(degree);
-        let (means, rotations, sh) = self.arrays_mut();
+        let MovedArrays { means, rotations, sh, .. } = self.moved_arrays_mut();
         let (means, rotations) = (&mut means[start..], &mut rotations[start..]);
         means.par_chunks_mut(CHUNK).zip(rotations.par_chunks_mut(CHUNK)).for_each(|(means, rotations)| {
             mirror_frames(means, rotations);

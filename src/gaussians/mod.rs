@@ -3,5 +3,6 @@
 pub mod buffer;
 pub mod mirror;
 pub mod sh;
+pub mod transform;
 
 pub use buffer::Gaussians;

@@ -17,6 +17,9 @@ pub struct Similarity {
 }
 
 impl Similarity {
+    /// The transform that changes nothing.
+    pub const IDENTITY: Self = Self { scale: 1.0, rotation: DMat3::IDENTITY, translation: DVec3::ZERO };
+
     /// From a row-major 4x4 matrix whose upper-left block is a scaled rotation and whose last row is 0 0 0 1.
     pub fn from_row_major(argument: &str, m: &[f64; 16]) -> Result<Self> {
         if m[12] != 0.0 || m[13] != 0.0 || m[14] != 0.0 || m[15] != 1.0 {

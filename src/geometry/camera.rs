@@ -100,6 +100,15 @@ impl CameraModel {
     }
 }
 
+/// Which of OpenCV's two lens models a calibration is of: the numbers alone do not tell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OpenCvModel {
+    /// `cv::calibrateCamera`: k1, k2, p1, p2, k3, k4, k5, k6.
+    Standard,
+    /// `cv::fisheye`: k1, k2, k3, k4 in the angle from the axis.
+    Fisheye,
+}
+
 /// A camera and where it stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
@@ -165,6 +174,36 @@ impl Camera {
             }
         };
         let camera = Self { width, height, intrinsics, distortion, vehicle_from_camera };
+        camera.validate(argument)?;
+        Ok(camera)
+    }
+
+    /// From an OpenCV calibration: the camera matrix `k`, `[3][3]` row-major, and the distortion coefficients.
+    ///
+    /// OpenCV puts the centre of the top-left pixel at (0, 0), we at (0.5, 0.5): half a pixel is added to the principal
+    /// point. `distortion` holds 0, 4, 5 or 8 numbers in OpenCV's order (k1, k2, p1, p2, k3, k4, k5, k6), missing ones
+    /// zero; 12 or 14 only where the rest is zero. Fisheye takes 0 or 4; without any, its picture is equidistant still,
+    /// not a pinhole's.
+    ///
+    /// # Errors
+    /// A skew, a last row that is not 0 0 1, a thin-prism or tilted-sensor term, another count, and whatever
+    /// [`Camera::validate`] refuses; `argument` names the camera.
+    pub fn from_opencv(
+        argument: &str,
+        k: &[f64; 9],
+        distortion: &[f64],
+        model: OpenCvModel,
+        width: u32,
+        height: u32,
+        vehicle_from_camera: Pose,
+    ) -> Result<Self> {
+        let camera = Self {
+            width,
+            height,
+            intrinsics: opencv_intrinsics(argument, k)?,
+            distortion: opencv_distortion(argument, distortion, model)?,
+            vehicle_from_camera,
+        };
         camera.validate(argument)?;
         Ok(camera)
     }
@@ -240,7 +279,40 @@ impl Camera {
         Some(DVec3::new(x, y, 1.0))
     }
 
-    /// The same camera with the picture resized to `width` x `height`.
+    /// The camera of the part of the picture that is `width` x `height` pixels large and whose top-left pixel is the
+    /// one in column `x`, row `y`. Every point of the scene stays in the pixel that shows it.
+    ///
+    /// # Errors
+    /// The part is empty or does not lie inside the picture.
+    pub fn cropped(&self, x: u32, y: u32, width: u32, height: u32) -> Result<Self> {
+        let inside = |start: u32, length: u32, size: u32| {
+            length > 0 && start.checked_add(length).is_some_and(|end| end <= size)
+        };
+        if !inside(x, width, self.width) || !inside(y, height, self.height) {
+            return Err(Error::argument(
+                "crop",
+                format!("{width}x{height} at column {x}, row {y}"),
+                format!("at least 1x1, inside {}x{}", self.width, self.height),
+            ));
+        }
+        let i = self.intrinsics;
+        let intrinsics = Intrinsics { cx: i.cx - f64::from(x), cy: i.cy - f64::from(y), ..i };
+        let camera = Self { width, height, intrinsics, ..*self };
+        camera.validate("crop")?;
+        Ok(camera)
+    }
+
+    /// [`Camera::scaled_to`] for a size that nobody has checked.
+    ///
+    /// # Errors
+    /// The size is not 1 to [`MAX_SIDE`], or takes the focal lengths out of what [`Camera::validate`] accepts.
+    pub fn resized(&self, width: u32, height: u32) -> Result<Self> {
+        let camera = self.scaled_to(width, height);
+        camera.validate("resized")?;
+        Ok(camera)
+    }
+
+    /// The same camera with the picture resized to `width` x `height`, which are not checked.
     pub fn scaled_to(&self, width: u32, height: u32) -> Self {
         let (sx, sy) = (f64::from(width) / f64::from(self.width), f64::from(height) / f64::from(self.height));
         let i = self.intrinsics;
@@ -250,5 +322,198 @@ impl Camera {
             intrinsics: Intrinsics { fx: i.fx * sx, fy: i.fy * sy, cx: i.cx * sx, cy: i.cy * sy },
             ..*self
         }
+    }
+}
+
+fn opencv_intrinsics(argument: &str, k: &[f64; 9]) -> Result<Intrinsics> {
+    let [fx, skew, cx, below, fy, cy, last @ ..] = *k;
+    // NaN is not equal to anything, itself included, and is refused here.
+    if skew != 0.0 || below != 0.0 || last != [0.0, 0.0, 1.0] {
+        return Err(Error::argument(
+            format!("{argument}.k"),
+            format!("{k:?}"),
+            "fx 0 cx, 0 fy cy, 0 0 1 (a calibration without skew)",
+        ));
+    }
+    Ok(Intrinsics { fx, fy, cx: cx + 0.5, cy: cy + 0.5 })
+}
+
+fn opencv_distortion(argument: &str, given: &[f64], model: OpenCvModel) -> Result<Distortion> {
+    let argument = format!("{argument}.distortion");
+    let (counts, allowed): (&[usize], _) = match model {
+        OpenCvModel::Standard => {
+            (&[0, 4, 5, 8, 12, 14], "0, 4, 5 or 8, or 12 or 14 with zeros behind the 8th")
+        }
+        OpenCvModel::Fisheye => (&[0, 4], "0 or 4 of a fisheye"),
+    };
+    if !counts.contains(&given.len()) {
+        return Err(Error::argument(argument, format!("{} numbers", given.len()), allowed));
+    }
+    let at = |i: usize| given.get(i).copied().unwrap_or(0.0);
+    if model == OpenCvModel::Fisheye {
+        return Ok(Distortion::Fisheye { k: [at(0), at(1), at(2), at(3)] });
+    }
+    if let Some(i) = (8..given.len()).find(|&i| given[i] != 0.0) {
+        let allowed = "0: thin prisms and tilted sensors are not understood";
+        return Err(Error::argument(format!("{argument}[{i}]"), given[i].to_string(), allowed));
+    }
+    let brown = Distortion::Brown { k: [at(0), at(1), at(4), at(5), at(6), at(7)], p: [at(2), at(3)] };
+    Ok(if brown.is_none() { Distortion::None } else { brown })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera() -> Camera {
+        let intrinsics = Intrinsics { fx: 500.0, fy: 510.0, cx: 320.25, cy: 239.5 };
+        let distortion = Distortion::Brown { k: [-0.2, 0.05, 0.0, 0.0, 0.0, 0.0], p: [1e-3, -2e-3] };
+        Camera { width: 640, height: 480, intrinsics, distortion, vehicle_from_camera: Pose::IDENTITY }
+    }
+
+    fn refused(result: Result<Camera>, beginning: &str) {
+        let error = result.unwrap_err().to_string();
+        assert!(error.starts_with(beginning), "{error}");
+    }
+
+    #[test]
+    fn a_cropped_camera_sees_every_point_in_the_pixel_that_showed_it() {
+        let (whole, part) = (camera(), camera().cropped(100, 37, 300, 200).unwrap());
+        assert_eq!((part.width, part.height), (300, 200));
+        for point in [DVec3::new(0.1, -0.2, 2.0), DVec3::new(-0.7, 0.4, 3.0)] {
+            let ([u, v], [u_part, v_part]) = (whole.project(point).unwrap(), part.project(point).unwrap());
+            // Pixels are a few hundred: a step of f64 is 6e-14.
+            assert!((u - 100.0 - u_part).abs() < 1e-12 && (v - 37.0 - v_part).abs() < 1e-12);
+        }
+        assert_eq!(whole.cropped(0, 0, 640, 480).unwrap(), whole);
+        assert!(whole.cropped(639, 479, 1, 1).is_ok());
+    }
+
+    #[test]
+    fn a_crop_that_is_empty_or_leaves_the_picture_is_refused() {
+        for (x, y, width, height) in [
+            (0, 0, 0, 10),
+            (0, 0, 10, 0),
+            (1, 0, 640, 480),
+            (0, 1, 1, 480),
+            (640, 0, 1, 1),
+            (u32::MAX, 0, 2, 1),
+        ] {
+            refused(camera().cropped(x, y, width, height), "crop: ");
+        }
+    }
+
+    #[test]
+    fn a_resized_camera_is_the_scaled_one_and_a_size_that_no_camera_has_is_refused() {
+        assert_eq!(camera().resized(320, 120).unwrap(), camera().scaled_to(320, 120));
+        for (width, height) in [(0, 480), (640, 0), (MAX_SIDE + 1, 480)] {
+            refused(camera().resized(width, height), "resized.size: ");
+        }
+        let short = Camera { intrinsics: Intrinsics { fx: 1e-3, ..camera().intrinsics }, ..camera() };
+        refused(short.resized(10, 10), "resized.focal length: ");
+    }
+
+    const K: [f64; 9] = [500.0, 0.0, 319.5, 0.0, 510.0, 239.25, 0.0, 0.0, 1.0];
+
+    fn opencv(k: &[f64; 9], distortion: &[f64], model: OpenCvModel) -> Result<Camera> {
+        Camera::from_opencv("views[1].camera", k, distortion, model, 640, 480, Pose::IDENTITY)
+    }
+
+    /// Pixel of a point as OpenCV's documentation of calib3d has it, top-left pixel's centre at (0, 0).
+    fn opencv_pixel(d: [f64; 8], [x, y, z]: [f64; 3]) -> [f64; 2] {
+        let [k1, k2, p1, p2, k3, k4, k5, k6] = d;
+        let (x, y) = (x / z, y / z);
+        let r2 = x.powi(2) + y.powi(2);
+        let radial = (1.0 + k1 * r2 + k2 * r2.powi(2) + k3 * r2.powi(3))
+            / (1.0 + k4 * r2 + k5 * r2.powi(2) + k6 * r2.powi(3));
+        let x2 = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x.powi(2));
+        let y2 = y * radial + p1 * (r2 + 2.0 * y.powi(2)) + 2.0 * p2 * x * y;
+        [K[0] * x2 + K[2], K[4] * y2 + K[5]]
+    }
+
+    /// The same of its documentation of the fisheye module.
+    fn opencv_fisheye_pixel([k1, k2, k3, k4]: [f64; 4], [x, y, z]: [f64; 3]) -> [f64; 2] {
+        let (a, b) = (x / z, y / z);
+        let r = (a.powi(2) + b.powi(2)).sqrt();
+        let t = r.atan();
+        let bent = t * (1.0 + k1 * t.powi(2) + k2 * t.powi(4) + k3 * t.powi(6) + k4 * t.powi(8));
+        [K[0] * (bent / r) * a + K[2], K[4] * (bent / r) * b + K[5]]
+    }
+
+    const POINTS: [[f64; 3]; 3] = [[0.3, -0.2, 2.0], [-1.1, 0.7, 2.5], [1e-3, 2e-3, 1.0]];
+
+    #[track_caller]
+    fn half_a_pixel_from(camera: &Camera, theirs: impl Fn([f64; 3]) -> [f64; 2]) {
+        for point in POINTS {
+            let (found, theirs) = (camera.project(DVec3::from_array(point)).unwrap(), theirs(point));
+            for axis in 0..2 {
+                // A step of f64 at a few hundred pixels is 6e-14.
+                assert!((found[axis] - theirs[axis] - 0.5).abs() < 1e-11, "{found:?} {theirs:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn points_lie_half_a_pixel_from_where_opencv_puts_them() {
+        let full = [-0.21, 0.06, 1e-3, -2e-3, 0.011, 0.02, -0.013, 0.004];
+        for count in [0, 4, 5, 8] {
+            let mut used = [0.0; 8];
+            used[..count].copy_from_slice(&full[..count]);
+            let camera = opencv(&K, &full[..count], OpenCvModel::Standard).unwrap();
+            half_a_pixel_from(&camera, |p| opencv_pixel(used, p));
+        }
+        for zeros in [12, 14] {
+            let mut padded = full.to_vec();
+            padded.resize(zeros, 0.0);
+            let camera = opencv(&K, &padded, OpenCvModel::Standard).unwrap();
+            assert_eq!(camera, opencv(&K, &full, OpenCvModel::Standard).unwrap());
+        }
+        let fisheye = [0.05, -0.02, 0.006, -0.001];
+        let camera = opencv(&K, &fisheye, OpenCvModel::Fisheye).unwrap();
+        half_a_pixel_from(&camera, |p| opencv_fisheye_pixel(fisheye, p));
+    }
+
+    #[test]
+    fn without_numbers_the_standard_model_is_a_pinhole_and_the_fisheye_is_equidistant() {
+        let pinhole = opencv(&K, &[], OpenCvModel::Standard).unwrap();
+        assert_eq!(pinhole.distortion, Distortion::None);
+        assert_eq!(opencv(&K, &[0.0; 5], OpenCvModel::Standard).unwrap(), pinhole);
+        let fisheye = opencv(&K, &[], OpenCvModel::Fisheye).unwrap();
+        half_a_pixel_from(&fisheye, |p| opencv_fisheye_pixel([0.0; 4], p));
+    }
+
+    #[test]
+    fn the_centre_of_opencv_s_first_pixel_is_ours() {
+        // A principal point on that pixel's centre: (0, 0) there, (0.5, 0.5) here.
+        let k = [500.0, 0.0, 0.0, 0.0, 500.0, 0.0, 0.0, 0.0, 1.0];
+        let camera = opencv(&k, &[], OpenCvModel::Standard).unwrap();
+        assert_eq!(camera.project(DVec3::Z), Some([0.5, 0.5]));
+    }
+
+    #[test]
+    fn calibrations_that_are_not_understood_are_refused_by_name() {
+        for (i, value) in [(1, 0.3), (3, 0.1), (6, 1e-9), (7, 1.0), (8, 2.0), (1, f64::NAN), (8, f64::NAN)] {
+            let mut k = K;
+            k[i] = value;
+            refused(opencv(&k, &[], OpenCvModel::Standard), "views[1].camera.k: ");
+        }
+        for count in [1, 2, 3, 6, 7, 9, 11, 13, 15] {
+            refused(opencv(&K, &vec![0.0; count], OpenCvModel::Standard), "views[1].camera.distortion: ");
+        }
+        for count in [1, 3, 5, 8] {
+            refused(opencv(&K, &vec![0.0; count], OpenCvModel::Fisheye), "views[1].camera.distortion: ");
+        }
+        for (count, i) in [(12, 8), (12, 11), (14, 12), (14, 13)] {
+            for value in [1e-4, f64::NAN] {
+                let mut d = vec![0.0; count];
+                d[i] = value;
+                let beginning = format!("views[1].camera.distortion[{i}]: ");
+                refused(opencv(&K, &d, OpenCvModel::Standard), &beginning);
+            }
+        }
+        refused(opencv(&K, &[f64::NAN; 4], OpenCvModel::Fisheye), "views[1].camera.distortion: ");
+        let mut k = K;
+        k[0] = -500.0;
+        refused(opencv(&k, &[], OpenCvModel::Standard), "views[1].camera.focal length: ");
     }
 }

@@ -14,6 +14,6 @@ pub mod pose;
 pub(crate) mod unfolded;
 
 pub use align::Similarity;
-pub use camera::{Camera, CameraModel, Intrinsics};
+pub use camera::{Camera, CameraModel, Intrinsics, OpenCvModel};
 pub use distortion::Distortion;
 pub use pose::Pose;

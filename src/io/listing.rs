@@ -5,6 +5,7 @@
 
 use super::depth::{DepthFormat, MILLIMETRES};
 use super::files::read_limited;
+use super::scene::SceneFormat;
 use super::{colmap, image, json, transforms};
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
@@ -45,22 +46,26 @@ pub struct DepthFile {
     pub unit: f64,
 }
 
-/// Lists the scene at `path`: a `transforms.json`, a folder with one, or else a COLMAP folder.
-pub(super) fn list(path: &Path) -> Result<Listing> {
+/// Lists the scene at `path`: a `transforms.json`, a folder with one, or else a COLMAP folder; or only what
+/// `format` asks for.
+pub(super) fn list(path: &Path, format: Option<SceneFormat>) -> Result<Listing> {
     let meta = std::fs::metadata(path).map_err(|e| Error::io(path, e))?;
     if meta.is_file() {
+        if format == Some(SceneFormat::Colmap) {
+            return Err(Error::format(path, "scene", "a file; allowed: a folder with a COLMAP model"));
+        }
         if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("json")) {
             return Err(Error::format(path, "scene", NO_SCENE));
         }
         return list_transforms(path);
     }
     let transforms = path.join("transforms.json");
-    if transforms.is_file() {
+    if transforms.is_file() && format != Some(SceneFormat::Colmap) {
         return list_transforms(&transforms);
     }
     match colmap::find_model(path) {
-        Some(model) => list_colmap(path, &model),
-        None => Err(Error::format(path, "scene", NO_SCENE)),
+        Some(model) if format != Some(SceneFormat::Transforms) => list_colmap(path, &model),
+        _ => Err(Error::format(path, "scene", NO_SCENE)),
     }
 }
 

@@ -23,11 +23,22 @@ pub struct SceneOptions {
     pub depth_scale: Option<f64>,
     /// Whether depth files are read where there are any.
     pub load_depth: bool,
+    /// The one kind of scene to look for; `None` means a `transforms.json` before a COLMAP model.
+    pub format: Option<SceneFormat>,
+}
+
+/// How a scene's cameras are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SceneFormat {
+    /// nerfstudio's `transforms.json`.
+    Transforms,
+    /// A COLMAP model.
+    Colmap,
 }
 
 impl Default for SceneOptions {
     fn default() -> Self {
-        Self { views: None, vehicle_from_world: None, depth_scale: None, load_depth: true }
+        Self { views: None, vehicle_from_world: None, depth_scale: None, load_depth: true, format: None }
     }
 }
 
@@ -85,7 +96,7 @@ pub fn list_scene(path: &Path, options: &SceneOptions) -> Result<SceneIndex> {
     {
         return Err(Error::argument("depth_scale", unit.to_string(), "metres per unit, above 0"));
     }
-    let Listing { source, mut views, not_vehicle_frame, sparse_model } = listing::list(path)?;
+    let Listing { source, mut views, not_vehicle_frame, sparse_model } = listing::list(path, options.format)?;
     if let (None, Some((field, reason))) = (&options.vehicle_from_world, not_vehicle_frame) {
         return Err(Error::format(&source, field, reason));
     }

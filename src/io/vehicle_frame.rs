@@ -79,7 +79,7 @@ pub fn parse_known_centers(bytes: &[u8], path: &Path) -> Result<Vec<(String, DVe
 /// The similarity that best takes the camera centres of the scene at `path` to known ones (Umeyama 1991). Cameras
 /// are known by name as in [`super::SceneOptions::views`]; at least three, not on one line.
 pub fn vehicle_from_known_centers(path: &Path, known: &[(String, DVec3)]) -> Result<Alignment> {
-    let listing = listing::list(path)?;
+    let listing = listing::list(path, None)?;
     let names: Vec<String> = known.iter().map(|(name, _)| name.clone()).collect();
     let chosen = select::select(&listing.views, &names)?;
     let centers: Vec<DVec3> = chosen.into_iter().map(|i| listing.views[i].camera.center()).collect();

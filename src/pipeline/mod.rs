@@ -8,4 +8,4 @@ pub mod run;
 
 pub use options::{Keep, Options, PriorChoice};
 pub use report::{InputError, LeftOut, Report, Stage};
-pub use run::{Reconstruction, reconstruct};
+pub use run::{PointCloud, Reconstruction, reconstruct, reconstruct_on};

@@ -9,7 +9,7 @@ use crate::head::surfel::FOOTPRINT_SIGMA_PX;
 use crate::head::{GaussianHead, SurfelHead};
 use crate::metrics;
 use crate::prior::{DepthPrior, Geometry, GivenDepth, HullPrior};
-use crate::progress::{Context, ProgressCallback};
+use crate::progress::{Context, ProgressCallback, Threads};
 use crate::render::{CpuRenderer, RenderOptions, Renderer};
 use crate::scene::visibility::{Observer, SURFACE_M, Sight};
 use crate::scene::{Scene, View, undistort};
@@ -46,7 +46,19 @@ pub fn reconstruct<'a>(
 ) -> Result<Reconstruction> {
     options.validate()?;
     scene.validate()?;
-    let context = Context::new(options.threads, progress)?;
+    reconstruct_on(&Threads::new(options.threads)?, scene, options, progress)
+}
+
+/// The same on threads that are there already; `options.threads` is not looked at.
+pub fn reconstruct_on<'a>(
+    threads: &'a Threads,
+    scene: &Scene,
+    options: &Options,
+    progress: &'a mut ProgressCallback<'a>,
+) -> Result<Reconstruction> {
+    options.validate()?;
+    scene.validate()?;
+    let context = Context::new(threads, progress);
     let mut clock = Clock::start();
 
     context.report("plan", 0.0)?;

@@ -1,7 +1,7 @@
 //! A rendered picture: colour, alpha and depth planes.
 
 /// What a renderer draws; rows without gaps, row 0 at the top.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rendered {
     /// Columns.
     pub width: u32,
@@ -31,7 +31,8 @@ impl Rendered {
     }
 }
 
-fn to_u8(v: f32) -> u8 {
+/// 8 bits of a value in [0, 1], rounded.
+pub(crate) fn to_u8(v: f32) -> u8 {
     // `as` saturates and sends NaN to 0.
     (v * 255.0).round() as u8
 }

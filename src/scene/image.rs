@@ -141,3 +141,5 @@ mod tests {
         }
     }
 }
+impl RgbImage { /// TEMP
+ pub fn from_owner(argument:&str,width:u32,height:u32,owner: impl AsRef<[u8]>+Send+'static)->Result<Self>{ Self::from_strided(argument, owner.as_ref(), width,height,width as usize*3, PixelFormat::Rgb8)} }

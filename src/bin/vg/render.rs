@@ -5,11 +5,10 @@ use crate::job::{self, Failure, Outcome, Result};
 use crate::shown::Bar;
 use crate::{files, scene};
 use glam::{DMat3, DVec3};
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use vg::geometry::Intrinsics;
 use vg::io::{self, NamedCamera, image, ply};
-use vg::progress::Context;
+use vg::progress::Threads;
 use vg::render::{Background, CpuRenderer, RenderOptions, Rendered, Renderer};
 use vg::{Camera, Gaussians, Pose};
 
@@ -43,12 +42,11 @@ pub(crate) fn run(args: &RenderArgs) -> Result {
     files::prepare_folder(if args.depth { &depth_folder } else { &args.output })?;
 
     let options = RenderOptions { background: args.background, ..RenderOptions::default() };
-    let mut silent = |_| ControlFlow::Continue(());
-    let context = Context::new(args.threads, &mut silent)?;
+    let threads = Threads::new(args.threads)?;
     let renderer = CpuRenderer::new();
     let bar = Bar::of_pictures(cameras.len());
     for (i, named) in cameras.iter().enumerate() {
-        let drawn = context.parallel(|| renderer.render(&gaussians, &named.camera, &options))?;
+        let drawn = threads.run(|| renderer.render(&gaussians, &named.camera, &options))?;
         write(&pictures[i], &drawn, options.background)?;
         if args.depth {
             let beyond = image::write_depth16(&depths[i], drawn.width, drawn.height, &drawn.depth)?;

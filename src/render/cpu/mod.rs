@@ -159,8 +159,7 @@ impl CpuRenderer {
 
 impl Renderer for CpuRenderer {
     fn render(&self, gaussians: &Gaussians, camera: &Camera, options: &RenderOptions) -> Result<Rendered> {
-        let mut target =
-            Rendered { width: 0, height: 0, color: Vec::new(), alpha: Vec::new(), depth: Vec::new() };
+        let mut target = Rendered::default();
         self.render_into(gaussians, camera, options, &mut target)?;
         Ok(target)
     }

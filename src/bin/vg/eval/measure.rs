@@ -7,13 +7,12 @@ use super::split::Split;
 use crate::job::Result;
 use crate::{reconstruct, scene};
 use serde::Serialize;
-use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 use vg::io::SceneOptions;
 use vg::metrics::ViewErrors;
 use vg::pipeline::{Options, PriorChoice, Reconstruction};
-use vg::progress::Context;
+use vg::progress::Threads;
 use vg::render::{CpuRenderer, RenderOptions, Rendered, Renderer};
 use vg::{Error, Gaussians, View};
 
@@ -115,18 +114,17 @@ pub(crate) fn judge(
 
 /// The model as these views' cameras see it, on white, and the median time of one picture, milliseconds.
 fn drawn(gaussians: &Gaussians, views: &[View], threads: usize) -> Result<(Vec<Rendered>, f64)> {
-    let mut silent = |_| ControlFlow::Continue(());
-    let context = Context::new(threads, &mut silent)?;
+    let threads = Threads::new(threads)?;
     let (renderer, options) = (CpuRenderer::new(), RenderOptions::default());
     // The first picture also pays for memory that later ones reuse.
     if let Some(first) = views.first() {
-        context.parallel(|| renderer.render(gaussians, &first.camera, &options))?;
+        threads.run(|| renderer.render(gaussians, &first.camera, &options))?;
     }
     let mut times = Vec::with_capacity(views.len());
     let mut pictures = Vec::with_capacity(views.len());
     for view in views {
         let start = Instant::now();
-        pictures.push(context.parallel(|| renderer.render(gaussians, &view.camera, &options))?);
+        pictures.push(threads.run(|| renderer.render(gaussians, &view.camera, &options))?);
         times.push(start.elapsed().as_secs_f64() * 1e3);
     }
     Ok((pictures, median(&mut times)))

@@ -1,0 +1,13 @@
+//! Names the C library by the number of its binary interface, `libvg.so.0`.
+
+fn main() {
+    println!("cargo::rerun-if-changed=build.rs");
+    let os = std::env::var("CARGO_CFG_TARGET_OS").unwrap_or_default();
+    match os.as_str() {
+        "linux" | "android" | "freebsd" | "netbsd" | "openbsd" => {
+            println!("cargo::rustc-cdylib-link-arg=-Wl,-soname,libvg.so.0");
+        }
+        "macos" => println!("cargo::rustc-cdylib-link-arg=-Wl,-install_name,@rpath/libvg.0.dylib"),
+        _ => {}
+    }
+}

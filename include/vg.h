@@ -1,0 +1,1494 @@
+/*
+ * vg.h - vehicle Gaussians: a few posed, masked photographs of one side of a vehicle in, a complete metric 3D
+ * Gaussian model out, drawn from any camera.
+ *
+ * This file is generated from src/capi by cbindgen; a test compares the two. License: MIT or Apache-2.0.
+ *
+ *     vg_gaussians *car = NULL;
+ *     vg_error *error = NULL;
+ *     if (vg_reconstruct(views, 4, NULL, &car, NULL, &error) != VG_STATUS_OK) {
+ *         fprintf(stderr, "%s\n", vg_error_message(error));
+ *         vg_error_free(error);
+ *     } else {
+ *         vg_gaussians_save_ply(car, "car.ply", NULL);
+ *     }
+ *     vg_gaussians_free(car);
+ *
+ * CONVENTIONS
+ *
+ * Frames.    The vehicle frame has x forward, y left, z up, right-handed; its plane of symmetry is y = 0. The camera
+ *            frame has x right, y down, z forward (COLMAP, OpenCV, ROS optical frames). Metres throughout.
+ *
+ * Poses.     Camera to vehicle: p_vehicle = R p_camera + t, as the first three rows [R | t] of a 4x4 matrix, double,
+ *            ROW-MAJOR. (Eigen's default is column-major; cv::Mat is row-major.) Quaternions are w, x, y, z.
+ *            COLMAP stores world to camera and nerfstudio stores OpenGL axes: vg_pose_from_colmap and
+ *            vg_pose_from_opengl convert. A tracked, moving vehicle: vg_pose_from_box.
+ *
+ * Pixels.    Column u counts right, row v counts down, row 0 is the top row. The centre of the top-left pixel is
+ *            (0.5, 0.5), as in COLMAP. OpenCV puts it at (0, 0): vg_camera_from_opencv converts.
+ *
+ * Images.    8-bit channels are sRGB-encoded and stay so; nothing is linearised. Any row stride, any alignment. The
+ *            library reads them during the call and neither changes nor keeps them.
+ *
+ * Masks.     One byte a pixel: 128 and above is vehicle. See vg_view for what no mask means.
+ *
+ * Depth.     float32, planar, along the optical axis, metres. 0, negative, NaN and infinite mean no measurement.
+ *
+ * Gaussians. float32, structure of arrays: centres, standard deviations and unit quaternions (w, x, y, z) that turn
+ *            the Gaussian's axes to the vehicle's; covariance = R diag(scale^2) R^T. Opacity is linear, 0 to 1. The
+ *            colour in unit direction d, from the camera to the Gaussian, is max(0, 0.5 + sum_k sh_k Y_k(d)), with
+ *            the basis, order and signs of 3D Gaussian Splatting, sRGB-encoded.
+ *
+ * Renders.   sRGB-encoded like the photographs. Transparent pictures have straight alpha or, if asked for,
+ *            premultiplied; opaque ones have alpha 1. 8-bit values are rounded and clamped; RGBA32F is not clamped
+ *            above 1.
+ *
+ * Ownership. Whoever receives a handle through an out parameter frees it with the matching _free function, which
+ *            accepts NULL. Pointers that a function returns are borrowed: they live as long as the handle they were
+ *            asked of. transform, mirror and merge return new handles. No struct owns what it points to.
+ *
+ * NULL.      Allowed where a comment says what it means; everywhere else it is an error, never a crash.
+ *
+ * Threads.   Handles never change after they are made. Any number of threads may use one handle at a time, a
+ *            vg_context too; only its _free must come last. The library starts threads of its own, in a context or
+ *            for the length of a call, and ends them with it; it has no other state, and does not touch signal
+ *            handlers, the locale, standard output or standard error. Callbacks come on the calling thread. After
+ *            fork, the child must not use a context of the parent.
+ *
+ * Errors.    Functions that can fail return a vg_status and, through out_error, an object with a message: which
+ *            argument, what was found, what is allowed. On failure, out handles are NULL, and everything the caller
+ *            owns is as it was. out_error may be NULL. A bug in the library is a status too; it neither aborts nor
+ *            throws. Running out of memory aborts, as it does in most programs.
+ *
+ * Same bytes. The same input and the same options give the same bytes, with any number of threads, on the same
+ *            processor family; other processors differ in the last bits. Times and memory in the report differ.
+ *
+ * Versions.  Functions, enumerators and fields are added and never change. A struct that may grow begins with
+ *            struct_size: call its _init function with sizeof, then set what you need. An older program's shorter
+ *            struct is read as far as it goes, and the rest has its default; a newer program's longer struct is
+ *            accepted where what lies beyond is zero. Arrays of structs step by the first element's struct_size.
+ *            Enumerations travel as int32_t, and fields called flags or reserved must be zero. Incompatible changes
+ *            change VG_ABI_VERSION and the library's file name, libvg.so.0.
+ */
+
+
+#ifndef VG_H
+#define VG_H
+
+#include <stddef.h>
+#include <stdint.h>
+#if defined(_WIN32) && defined(VG_SHARED)
+#define VG_API __declspec(dllimport)
+#else
+#define VG_API
+#endif
+
+
+/**
+ * Major part of the version of this header.
+ */
+#define VG_VERSION_MAJOR 0
+
+/**
+ * Minor part of the version of this header.
+ */
+#define VG_VERSION_MINOR 1
+
+/**
+ * Patch part of the version of this header.
+ */
+#define VG_VERSION_PATCH 0
+
+/**
+ * Number of the binary interface: the number in `libvg.so.0`. Programs built against any header with this number
+ * run with any library of this number that is as new or newer.
+ */
+#define VG_ABI_VERSION 0
+
+/**
+ * What a function returns. Numbers are never reused; later versions may add some, so treat an unknown one as a
+ * failure.
+ */
+enum vg_status
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Done.
+     */
+    VG_STATUS_OK = 0,
+    /**
+     * An argument is outside what the function accepts.
+     */
+    VG_STATUS_ARGUMENT = 1,
+    /**
+     * A file's content is not what its format promises.
+     */
+    VG_STATUS_FORMAT = 2,
+    /**
+     * The operating system refused a file operation.
+     */
+    VG_STATUS_IO = 3,
+    /**
+     * The input is well formed, but no vehicle can be made of it.
+     */
+    VG_STATUS_RECONSTRUCTION = 4,
+    /**
+     * The progress callback asked to stop.
+     */
+    VG_STATUS_CANCELLED = 5,
+    /**
+     * This build of the library was made without what was asked for.
+     */
+    VG_STATUS_NOT_BUILT = 6,
+    /**
+     * A bug in the library. The call had no effect; other handles are as they were.
+     */
+    VG_STATUS_INTERNAL = 7,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_status vg_status;
+#else
+typedef int32_t vg_status;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What a pixel holds. 8-bit channels are sRGB-encoded, as cameras and picture files have them.
+ */
+enum vg_format
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * uint8 R, G, B.
+     */
+    VG_FORMAT_RGB8 = 1,
+    /**
+     * uint8 B, G, R (OpenCV).
+     */
+    VG_FORMAT_BGR8 = 2,
+    /**
+     * uint8 R, G, B, A; alpha is straight.
+     */
+    VG_FORMAT_RGBA8 = 3,
+    /**
+     * uint8 B, G, R, A; alpha is straight.
+     */
+    VG_FORMAT_BGRA8 = 4,
+    /**
+     * uint8 luminance; the format of masks.
+     */
+    VG_FORMAT_GRAY8 = 5,
+    /**
+     * float32 R, G, B, A; sRGB-encoded, 0 to 1.
+     */
+    VG_FORMAT_RGBA32F = 6,
+    /**
+     * float32 planar depth along the optical axis, metres; 0, negative, NaN and infinite mean no measurement.
+     */
+    VG_FORMAT_DEPTH32F = 7,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_format vg_format;
+#else
+typedef int32_t vg_format;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * COLMAP's camera models and their numbers. Undistort pictures of other models first, with
+ * `colmap image_undistorter`.
+ */
+enum vg_camera_model
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * f, cx, cy
+     */
+    VG_CAMERA_MODEL_SIMPLE_PINHOLE = 0,
+    /**
+     * fx, fy, cx, cy
+     */
+    VG_CAMERA_MODEL_PINHOLE = 1,
+    /**
+     * f, cx, cy, k
+     */
+    VG_CAMERA_MODEL_SIMPLE_RADIAL = 2,
+    /**
+     * f, cx, cy, k1, k2
+     */
+    VG_CAMERA_MODEL_RADIAL = 3,
+    /**
+     * fx, fy, cx, cy, k1, k2, p1, p2
+     */
+    VG_CAMERA_MODEL_OPENCV = 4,
+    /**
+     * fx, fy, cx, cy, k1, k2, k3, k4
+     */
+    VG_CAMERA_MODEL_OPENCV_FISHEYE = 5,
+    /**
+     * fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6
+     */
+    VG_CAMERA_MODEL_FULL_OPENCV = 6,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_camera_model vg_camera_model;
+#else
+typedef int32_t vg_camera_model;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Where metric depth comes from.
+ */
+enum vg_prior
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * `VG_PRIOR_GIVEN` if every used view has depth, else `VG_PRIOR_HULL`.
+     */
+    VG_PRIOR_AUTO = 0,
+    /**
+     * The depth in the views.
+     */
+    VG_PRIOR_GIVEN = 1,
+    /**
+     * The hull of the silhouettes and their mirrored twins; needs masks and nothing else.
+     */
+    VG_PRIOR_HULL = 2,
+    /**
+     * A network run by ONNX Runtime. `VG_STATUS_NOT_BUILT` in a build without it.
+     */
+    VG_PRIOR_ONNX = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_prior vg_prior;
+#else
+typedef int32_t vg_prior;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * How the side that was not photographed is completed across the plane y = 0.
+ */
+enum vg_symmetry
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * What no view observed is mirrored; what was observed much better on the other side gives way.
+     */
+    VG_SYMMETRY_AUTO = 0,
+    /**
+     * The side with more Gaussians replaces the other, whatever was observed there.
+     */
+    VG_SYMMETRY_ALWAYS = 1,
+    /**
+     * Nothing is mirrored.
+     */
+    VG_SYMMETRY_NEVER = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_symmetry vg_symmetry;
+#else
+typedef int32_t vg_symmetry;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What may not be left out although the scene does not need it; bits of `vg_options.keep`.
+ */
+enum vg_keep
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Views whose camera another view already has.
+     */
+    VG_KEEP_DUPLICATE_VIEWS = 1,
+    /**
+     * Pixels that another view shows at a higher resolution.
+     */
+    VG_KEEP_OVERLAP = 2,
+    /**
+     * Pixels on the silhouette's edge.
+     */
+    VG_KEEP_SILHOUETTE_EDGE = 4,
+    /**
+     * Floating pixels at depth edges.
+     */
+    VG_KEEP_FLOATERS = 8,
+    /**
+     * Bands of colour that the spread of viewing directions cannot support.
+     */
+    VG_KEEP_SH_BANDS = 16,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_keep vg_keep;
+#else
+typedef int32_t vg_keep;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * How important a log line is.
+ */
+enum vg_log_level
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Legal, but looks like a mistake.
+     */
+    VG_LOG_LEVEL_WARNING = 1,
+    /**
+     * What was done or left out.
+     */
+    VG_LOG_LEVEL_INFO = 2,
+    /**
+     * Times of stages.
+     */
+    VG_LOG_LEVEL_DEBUG = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_log_level vg_log_level;
+#else
+typedef int32_t vg_log_level;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What draws.
+ */
+enum vg_backend
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * What is best of what this build and this machine have.
+     */
+    VG_BACKEND_AUTO = 0,
+    /**
+     * The context's threads.
+     */
+    VG_BACKEND_CPU = 1,
+    /**
+     * A graphics processor. `VG_STATUS_NOT_BUILT` in a build without it.
+     */
+    VG_BACKEND_GPU = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_backend vg_backend;
+#else
+typedef int32_t vg_backend;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What shows where the vehicle does not.
+ */
+enum vg_background
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * A colour; the picture is opaque, its alpha 1.
+     */
+    VG_BACKGROUND_COLOR = 0,
+    /**
+     * Nothing; the picture's alpha is how much of the pixel the vehicle covers.
+     */
+    VG_BACKGROUND_TRANSPARENT = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_background vg_background;
+#else
+typedef int32_t vg_background;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What the colours of a picture with a transparent background are multiplied by.
+ */
+enum vg_alpha
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * By nothing, as PNG files want it; 0 where alpha is 0.
+     */
+    VG_ALPHA_STRAIGHT = 0,
+    /**
+     * By alpha, as compositing wants it.
+     */
+    VG_ALPHA_PREMULTIPLIED = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_alpha vg_alpha;
+#else
+typedef int32_t vg_alpha;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What a depth pixel means.
+ */
+enum vg_depth_mode
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Expected planar depth along the optical axis in metres; 0 where alpha is 0.
+     */
+    VG_DEPTH_MODE_EXPECTED = 0,
+    /**
+     * The same times alpha: the plain sum over the Gaussians.
+     */
+    VG_DEPTH_MODE_ACCUMULATED = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_depth_mode vg_depth_mode;
+#else
+typedef int32_t vg_depth_mode;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Worker threads and scratch memory, made once and named in the options of calls, so that a call neither starts
+ * threads nor allocates what the last one had. Any number of threads may use one context at a time. Free it with
+ * `vg_context_free`, after the last call that uses it has returned; results do not depend on it.
+ */
+typedef struct vg_context vg_context;
+
+/**
+ * Why a call failed. Owned by the caller, who frees it with `vg_error_free`; it never changes, and any thread may
+ * read it.
+ */
+typedef struct vg_error vg_error;
+
+/**
+ * A set of Gaussians. Owned by the caller, who frees it with `vg_gaussians_free`. It never changes: `transform`,
+ * `mirror` and `merge` return new ones, and any number of threads may read or render one at a time.
+ */
+typedef struct vg_gaussians vg_gaussians;
+
+/**
+ * What a reconstruction did, how long it took, what it left out, and the error it can know. Owned by the caller,
+ * who frees it with `vg_report_free`; it never changes.
+ */
+typedef struct vg_report vg_report;
+
+/**
+ * Views read from files, with their pixels. Owned by the caller, who frees it with `vg_scene_free`; it never
+ * changes, and any number of threads may read it.
+ */
+typedef struct vg_scene vg_scene;
+
+/**
+ * Settings of a context.
+ */
+typedef struct vg_context_options {
+    /**
+     * `sizeof(vg_context_options)`.
+     */
+    size_t struct_size;
+    /**
+     * Worker threads, 1 to 1024; 0: one per core. The calling thread waits while they work.
+     */
+    uint32_t threads;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t flags;
+} vg_context_options;
+
+/**
+ * A camera: its size, its lens, and where it stands. It lies inside `vg_view`, so its size never changes.
+ */
+typedef struct vg_camera {
+    /**
+     * `sizeof(vg_camera)`.
+     */
+    size_t struct_size;
+    /**
+     * Columns, 1 to 8192.
+     */
+    uint32_t width;
+    /**
+     * Rows, 1 to 8192.
+     */
+    uint32_t height;
+    /**
+     * A `vg_camera_model`.
+     */
+    int32_t model;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t flags;
+    /**
+     * The model's parameters in COLMAP's order, pixels; the rest must be 0. The centre of the top-left pixel is
+     * (0.5, 0.5).
+     */
+    double params[16];
+    /**
+     * Camera to vehicle, the first three rows of a 4x4 matrix, row-major: r00 r01 r02 tx, r10 r11 r12 ty,
+     * r20 r21 r22 tz; metres. A rotation up to 1e-2, which is removed; mirrors and scales are refused.
+     */
+    double vehicle_from_camera[12];
+    /**
+     * Reserved: 0.
+     */
+    uint64_t reserved[4];
+} vg_camera;
+
+/**
+ * A picture that the library reads during the call and does not keep. All zero: no picture.
+ */
+typedef struct vg_image {
+    /**
+     * The first pixel of the top row. Any alignment. NULL: no picture; the other fields are not looked at.
+     */
+    const void *data;
+    /**
+     * Bytes from one row to the next (`cv::Mat::step`, ROS `Image.step`); 0: rows without gaps.
+     */
+    size_t row_stride;
+    /**
+     * Columns; must equal the camera's.
+     */
+    uint32_t width;
+    /**
+     * Rows; must equal the camera's.
+     */
+    uint32_t height;
+    /**
+     * A `vg_format`.
+     */
+    int32_t format;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t flags;
+} vg_image;
+
+/**
+ * One photograph of the vehicle.
+ */
+typedef struct vg_view {
+    /**
+     * `sizeof(vg_view)`; the same in all elements of an array.
+     */
+    size_t struct_size;
+    /**
+     * UTF-8 name for messages and the report; NULL: none. Read during the call only, like all pointers here.
+     */
+    const char *name;
+    /**
+     * Lens and pose.
+     */
+    struct vg_camera camera;
+    /**
+     * The photograph, RGB8, BGR8, RGBA8, BGRA8 or GRAY8, of the camera's size. RGB8 without gaps between rows is
+     * read in place; anything else is copied once.
+     */
+    struct vg_image image;
+    /**
+     * GRAY8, of the camera's size: 128 and above is vehicle. `data` NULL: the photograph's alpha is the mask; where
+     * it has none, every pixel is vehicle, which the silhouette prior refuses.
+     */
+    struct vg_image mask;
+    /**
+     * DEPTH32F, of the camera's size. `data` NULL: not measured.
+     */
+    struct vg_image depth;
+} vg_view;
+
+/**
+ * Called on the calling thread at every stage boundary and inside long stages: the stage's name, how much of it is
+ * done, 0 to 1, and the caller's pointer. Returns 0 to go on; anything else ends the call with
+ * `VG_STATUS_CANCELLED`. May call the library; may not throw or jump out.
+ */
+typedef int32_t (*vg_progress_fn)(const char *stage,
+                                  double fraction,
+                                  void *user);
+
+/**
+ * Called on the calling thread with a `vg_log_level` and one line of UTF-8 that lives until it returns. May call
+ * the library; may not throw or jump out.
+ */
+typedef void (*vg_log_fn)(int32_t level,
+                          const char *message,
+                          void *user);
+
+/**
+ * Settings of `vg_reconstruct`.
+ */
+typedef struct vg_options {
+    /**
+     * `sizeof(vg_options)`.
+     */
+    size_t struct_size;
+    /**
+     * Threads and memory to use. NULL: made for this call, one thread per core.
+     */
+    struct vg_context *context;
+    /**
+     * A `vg_prior`. Default `VG_PRIOR_AUTO`.
+     */
+    int32_t prior;
+    /**
+     * A `vg_symmetry`. Default `VG_SYMMETRY_AUTO`.
+     */
+    int32_t symmetry;
+    /**
+     * Highest degree of the colour's spherical harmonics, 0 to 3. Default 2.
+     */
+    int32_t sh_degree;
+    /**
+     * Bits of `vg_keep`. Default 0.
+     */
+    uint32_t keep;
+    /**
+     * 1: draw the model into its input views and report the error there; 0: do not. Default 1.
+     */
+    int32_t check;
+    /**
+     * 1: the report also holds the metric coloured point cloud; 0: it does not. Default 0.
+     */
+    int32_t points;
+    /**
+     * Length, width, height of the vehicle in metres, each 0.1 to 30; all 0: not known. Default 0, 0, 0.
+     */
+    double vehicle_size[3];
+    /**
+     * NULL: none.
+     */
+    vg_progress_fn progress;
+    /**
+     * Handed to `progress`.
+     */
+    void *progress_user;
+    /**
+     * NULL: none.
+     */
+    vg_log_fn log;
+    /**
+     * Handed to `log`.
+     */
+    void *log_user;
+} vg_options;
+
+/**
+ * The main figures of a report.
+ */
+typedef struct vg_report_figures {
+    /**
+     * `sizeof(vg_report_figures)`.
+     */
+    size_t struct_size;
+    /**
+     * Gaussians in the result.
+     */
+    uint64_t gaussian_count;
+    /**
+     * How many of them are mirror images.
+     */
+    uint64_t mirrored_count;
+    /**
+     * Views used; the JSON tells which, and why others were not.
+     */
+    uint32_t views_used;
+    /**
+     * Worker threads.
+     */
+    uint32_t threads;
+    /**
+     * The `vg_prior` that was used.
+     */
+    int32_t prior;
+    /**
+     * Degree of the result's spherical harmonics.
+     */
+    int32_t sh_degree;
+    /**
+     * Wall time of the call, milliseconds.
+     */
+    double total_ms;
+    /**
+     * Highest resident memory of the process so far, bytes; 0 where the system does not tell.
+     */
+    uint64_t peak_rss_bytes;
+    /**
+     * 1 if the three fields that follow hold the error on the input views, 0 if the check was switched off.
+     */
+    int32_t has_input_error;
+    /**
+     * 1 if the prior worked in a box whose size follows below.
+     */
+    int32_t has_box;
+    /**
+     * Mean PSNR over the used views, on white, full frame, dB.
+     */
+    double input_psnr_db;
+    /**
+     * Mean intersection over union of the model's silhouette and the masks.
+     */
+    double input_silhouette_iou;
+    /**
+     * Length, width, height of the box, metres.
+     */
+    double box_size[3];
+    /**
+     * Lowest corner of the Gaussians' centres, metres.
+     */
+    double extent_low[3];
+    /**
+     * Highest corner of the Gaussians' centres, metres.
+     */
+    double extent_high[3];
+} vg_report_figures;
+
+/**
+ * Arrays to make Gaussians from; read during the call and not kept.
+ */
+typedef struct vg_gaussian_arrays {
+    /**
+     * `sizeof(vg_gaussian_arrays)`.
+     */
+    size_t struct_size;
+    /**
+     * How many Gaussians, at most 2147483647. The pointers may be NULL where it is 0.
+     */
+    size_t count;
+    /**
+     * Centres, metres. `[count][3]`
+     */
+    const float *positions;
+    /**
+     * Standard deviations along the Gaussian's own axes, metres, above 0. `[count][3]`
+     */
+    const float *scales;
+    /**
+     * Quaternions w, x, y, z of any norm but zero; stored normalised. `[count][4]`
+     */
+    const float *rotations;
+    /**
+     * Peak opacities, 0 to 1. `[count]`
+     */
+    const float *opacities;
+    /**
+     * Coefficients of spherical harmonics. `[count][(sh_degree + 1)^2][3]`
+     */
+    const float *sh;
+    /**
+     * 0 to 3.
+     */
+    int32_t sh_degree;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t flags;
+} vg_gaussian_arrays;
+
+/**
+ * Settings of `vg_render`.
+ */
+typedef struct vg_render_options {
+    /**
+     * `sizeof(vg_render_options)`.
+     */
+    size_t struct_size;
+    /**
+     * Threads and memory to use. NULL: made for this call, one thread per core; make one where pictures follow
+     * each other.
+     */
+    struct vg_context *context;
+    /**
+     * A `vg_backend`. Default `VG_BACKEND_AUTO`.
+     */
+    int32_t backend;
+    /**
+     * A `vg_background`. Default `VG_BACKGROUND_COLOR`.
+     */
+    int32_t background;
+    /**
+     * The colour, R G B, sRGB-encoded, each 0 to 1. Default white.
+     */
+    float background_color[3];
+    /**
+     * A `vg_alpha`; matters where the background is transparent. Default `VG_ALPHA_STRAIGHT`.
+     */
+    int32_t alpha;
+    /**
+     * A `vg_depth_mode`. Default `VG_DEPTH_MODE_EXPECTED`.
+     */
+    int32_t depth_mode;
+    /**
+     * Bands of colour above this degree are left out, 0 to 3. Default 3: all there are.
+     */
+    int32_t sh_degree;
+    /**
+     * 1: compensate opacity for the blur; for pictures much smaller than the photographs. Default 0.
+     */
+    int32_t antialiased;
+    /**
+     * Variance added to each projected Gaussian, pixels^2, 1e-4 to 100. Default 0.3.
+     */
+    float blur;
+    /**
+     * Gaussians whose centre is nearer along the optical axis are not drawn, metres, 1e-6 to 1e10. Default 0.01.
+     */
+    float near_plane;
+    /**
+     * Gaussians whose centre is farther are not drawn, metres, `near_plane` to 1e10. Default 1e10.
+     */
+    float far_plane;
+    /**
+     * Largest alpha of one Gaussian in one pixel, 0.01 to 0.9999. Default 0.99.
+     */
+    float max_alpha;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t flags;
+} vg_render_options;
+
+/**
+ * Where `vg_render` puts the picture: colour, depth, or both.
+ */
+typedef struct vg_image_target {
+    /**
+     * `sizeof(vg_image_target)`.
+     */
+    size_t struct_size;
+    /**
+     * Columns; must equal the camera's.
+     */
+    uint32_t width;
+    /**
+     * Rows; must equal the camera's.
+     */
+    uint32_t height;
+    /**
+     * The first pixel of the top row. Any alignment. NULL: no colour.
+     */
+    void *color;
+    /**
+     * Bytes from one row to the next; 0: rows without gaps. What lies between rows is not touched.
+     */
+    size_t color_row_stride;
+    /**
+     * The first depth pixel of the top row, float32, see `vg_depth_mode`. Any alignment. NULL: no depth.
+     */
+    void *depth;
+    /**
+     * Bytes from one row to the next; 0: rows without gaps.
+     */
+    size_t depth_row_stride;
+    /**
+     * RGBA8, BGRA8 or RGBA32F; with an opaque background RGB8 and BGR8 too.
+     */
+    int32_t color_format;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t flags;
+} vg_image_target;
+
+/**
+ * What of a scene is wanted, and what its files do not say.
+ */
+typedef struct vg_scene_options {
+    /**
+     * `sizeof(vg_scene_options)`.
+     */
+    size_t struct_size;
+    /**
+     * Threads that decode. NULL: made for this call, one thread per core.
+     */
+    struct vg_context *context;
+    /**
+     * 16 numbers, a row-major 4x4 similarity from the world of the poses to the vehicle's frame in metres. A COLMAP
+     * model needs it. NULL for a `transforms.json`: its world is the vehicle's frame.
+     */
+    const double *vehicle_from_world;
+    /**
+     * The views wanted, in this order, each by path, file name, or file name without extension, UTF-8.
+     * NULL: all views.
+     */
+    const char *const *names;
+    /**
+     * How many names; 0 with NULL.
+     */
+    size_t name_count;
+    /**
+     * Metres per number in the depth files; 0: as the scene says, else millimetres for integers, metres for floats.
+     */
+    double depth_scale;
+    /**
+     * 1: read depth files where there are any; 0: do not. Default 1.
+     */
+    int32_t load_depth;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t flags;
+    /**
+     * Told what is legal but looks like a mistake. NULL: nobody.
+     */
+    vg_log_fn log;
+    /**
+     * Handed to `log`.
+     */
+    void *log_user;
+} vg_scene_options;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+/**
+ * Version of the library that is running, "0.1.0". Static; never NULL.
+ */
+VG_API
+const char *vg_version(void);
+
+/**
+ * `VG_ABI_VERSION` of the library that is running; compare it with the header's when loading by hand.
+ */
+VG_API
+uint32_t vg_abi_version(void);
+
+/**
+ * The status of the call that made this error. NULL: `VG_STATUS_OK`.
+ */
+VG_API
+vg_status vg_error_code(const struct vg_error *error);
+
+/**
+ * What went wrong in one line of UTF-8: the argument, what was found, what is allowed. Lives as long as the error.
+ * NULL: an empty string. Never NULL.
+ */
+VG_API
+const char *vg_error_message(const struct vg_error *error);
+
+/**
+ * Frees an error. NULL: nothing happens.
+ */
+VG_API
+void vg_error_free(struct vg_error *error);
+
+/**
+ * Sets `*options` to the default values. `size`: `sizeof *options`.
+ */
+VG_API
+vg_status vg_context_options_init(struct vg_context_options *options,
+                                  size_t size);
+
+/**
+ * Makes a context.
+ *
+ * - options: NULL for the default values.
+ * - out: receives the context; the caller frees it.
+ * - out_error: NULL, or receives the error; NULL on success.
+ */
+VG_API
+vg_status vg_context_new(const struct vg_context_options *options,
+                         struct vg_context **out,
+                         struct vg_error **out_error);
+
+/**
+ * How many worker threads a context has. NULL: 0.
+ */
+VG_API
+uint32_t vg_context_threads(const struct vg_context *context);
+
+/**
+ * Ends the context's threads and frees its memory. No call may be using it. NULL: nothing happens.
+ */
+VG_API
+void vg_context_free(struct vg_context *context);
+
+/**
+ * Sets `*camera` to a pinhole without size at the origin. `size`: `sizeof *camera`.
+ */
+VG_API
+vg_status vg_camera_init(struct vg_camera *camera,
+                         size_t size);
+
+/**
+ * A camera from one of COLMAP's models.
+ *
+ * - model: a `vg_camera_model`; COLMAP's numbers.
+ * - params, param_count: as many as the model has, in COLMAP's order.
+ * - vehicle_from_camera: 12 numbers as in `vg_camera`; NULL: the identity.
+ * - out: receives the whole camera, `struct_size` included; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_camera_from_colmap_model(int32_t model,
+                                      const double *params,
+                                      size_t param_count,
+                                      uint32_t width,
+                                      uint32_t height,
+                                      const double *vehicle_from_camera,
+                                      struct vg_camera *out,
+                                      struct vg_error **out_error);
+
+/**
+ * A camera from OpenCV's calibration, whose pixel centres are half a pixel from ours: cx and cy grow by 0.5.
+ *
+ * - k: the 3x3 camera matrix, row-major, without skew.
+ * - distortion, distortion_count: 0, 4, 5 or 8 numbers k1 k2 p1 p2 k3 k4 k5 k6, or 12 or 14 with zeros
+ *   behind the 8th; with `fisheye`, 0 or 4.
+ * - fisheye: 0: `cv::calibrateCamera`'s model; 1: `cv::fisheye`'s.
+ * - vehicle_from_camera: 12 numbers as in `vg_camera`; NULL: the identity.
+ * - out: receives the whole camera, `struct_size` included; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_camera_from_opencv(const double *k,
+                                const double *distortion,
+                                size_t distortion_count,
+                                int32_t fisheye,
+                                uint32_t width,
+                                uint32_t height,
+                                const double *vehicle_from_camera,
+                                struct vg_camera *out,
+                                struct vg_error **out_error);
+
+/**
+ * The camera of the picture resized to `width` x `height`.
+ *
+ * - camera: is not changed.
+ * - out: receives the camera; may be `camera` itself; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_camera_scale(const struct vg_camera *camera,
+                          uint32_t width,
+                          uint32_t height,
+                          struct vg_camera *out,
+                          struct vg_error **out_error);
+
+/**
+ * The camera of the part of the picture that begins at column `x`, row `y`, and is `width` x `height`.
+ *
+ * - camera: is not changed. The part must lie inside its picture.
+ * - out: receives the camera; may be `camera` itself; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_camera_crop(const struct vg_camera *camera,
+                         uint32_t x,
+                         uint32_t y,
+                         uint32_t width,
+                         uint32_t height,
+                         struct vg_camera *out,
+                         struct vg_error **out_error);
+
+/**
+ * A pose from COLMAP's `images.txt`: QW QX QY QZ and TX TY TZ, world to camera.
+ *
+ * - qvec: 4 numbers w, x, y, z of any norm but zero.
+ * - tvec: 3 numbers.
+ * - vehicle_from_world: 16 numbers, a row-major 4x4 similarity that takes COLMAP's world, which lies anywhere and
+ *   has any scale, to the vehicle's frame in metres. NULL: the world is the vehicle's frame.
+ * - out: receives 12 numbers, camera to vehicle, as in `vg_camera`; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_pose_from_colmap(const double *qvec,
+                              const double *tvec,
+                              const double *vehicle_from_world,
+                              double *out,
+                              struct vg_error **out_error);
+
+/**
+ * A pose from an OpenGL, Blender or nerfstudio matrix: camera to world, camera axes x right, y up, z backward.
+ *
+ * - camera_to_world: 12 numbers, the first three rows, row-major.
+ * - vehicle_from_world: 16 numbers, as in `vg_pose_from_colmap`. NULL: the world is the vehicle's frame.
+ * - out: receives 12 numbers, camera to vehicle, as in `vg_camera`; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_pose_from_opengl(const double *camera_to_world,
+                              const double *vehicle_from_world,
+                              double *out,
+                              struct vg_error **out_error);
+
+/**
+ * A pose from a tracked box: where the vehicle and the camera are in any common frame (ego, map, UTM) at the
+ * moment of the picture. The vehicle may move between pictures. Camera axes x right, y down, z forward; box axes
+ * x forward, y left, z up, its origin on the vehicle's plane of symmetry.
+ *
+ * - vehicle_in_ego: 12 numbers, vehicle to common frame, row-major, metres.
+ * - camera_in_ego: 12 numbers, camera to the same frame.
+ * - out: receives 12 numbers, camera to vehicle, as in `vg_camera`; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_pose_from_box(const double *vehicle_in_ego,
+                           const double *camera_in_ego,
+                           double *out,
+                           struct vg_error **out_error);
+
+/**
+ * The pixel of a point.
+ *
+ * - camera: is not changed.
+ * - point_vehicle: 3 numbers, metres, vehicle frame.
+ * - out_pixel: receives 2 numbers, column and row; a picture's pixels are 0 to width and 0 to height. Unchanged on
+ *   failure, and where the point lies on or behind the camera's plane, which is `VG_STATUS_ARGUMENT`.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_camera_project(const struct vg_camera *camera,
+                            const double *point_vehicle,
+                            double *out_pixel,
+                            struct vg_error **out_error);
+
+/**
+ * Sets `*view` to a view without picture. `size`: `sizeof *view`.
+ */
+VG_API
+vg_status vg_view_init(struct vg_view *view,
+                       size_t size);
+
+/**
+ * Sets `*options` to the default values. `size`: `sizeof *options`.
+ */
+VG_API
+vg_status vg_options_init(struct vg_options *options,
+                          size_t size);
+
+/**
+ * Sets `*figures` to zeros. `size`: `sizeof *figures`.
+ */
+VG_API
+vg_status vg_report_figures_init(struct vg_report_figures *figures,
+                                 size_t size);
+
+/**
+ * The main figures.
+ *
+ * - report: not NULL.
+ * - out: a struct that `vg_report_figures_init` was called for; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_report_get_figures(const struct vg_report *report,
+                                struct vg_report_figures *out,
+                                struct vg_error **out_error);
+
+/**
+ * The whole report as JSON. Lives as long as the report. NULL: an empty string. Never NULL.
+ */
+VG_API
+const char *vg_report_json(const struct vg_report *report);
+
+/**
+ * How many points the metric coloured point cloud has; 0 unless `vg_options.points` was 1. NULL: 0.
+ */
+VG_API
+size_t vg_report_point_count(const struct vg_report *report);
+
+/**
+ * Positions of the points, float32 `[count][3]`, metres, vehicle frame. Lives as long as the report. NULL where
+ * there are none.
+ */
+VG_API
+const float *vg_report_point_positions(const struct vg_report *report);
+
+/**
+ * Colours of the points, uint8 `[count][3]`, sRGB. Lives as long as the report. NULL where there are none.
+ */
+VG_API
+const uint8_t *vg_report_point_colors(const struct vg_report *report);
+
+/**
+ * Frees a report. NULL: nothing happens.
+ */
+VG_API
+void vg_report_free(struct vg_report *report);
+
+/**
+ * Sets `*arrays` to no Gaussians of degree 0. `size`: `sizeof *arrays`.
+ */
+VG_API
+vg_status vg_gaussian_arrays_init(struct vg_gaussian_arrays *arrays,
+                                  size_t size);
+
+/**
+ * How many Gaussians. NULL: 0.
+ */
+VG_API
+size_t vg_gaussians_count(const struct vg_gaussians *gaussians);
+
+/**
+ * Degree of the spherical harmonics, 0 to 3. NULL: 0.
+ */
+VG_API
+int32_t vg_gaussians_sh_degree(const struct vg_gaussians *gaussians);
+
+/**
+ * Centres, float32 `[count][3]`, metres. Lives as long as the Gaussians. NULL where there are none.
+ */
+VG_API
+const float *vg_gaussians_positions(const struct vg_gaussians *gaussians);
+
+/**
+ * Standard deviations along the Gaussian's own axes, float32 `[count][3]`, metres. Lives as long as the Gaussians.
+ * NULL where there are none.
+ */
+VG_API
+const float *vg_gaussians_scales(const struct vg_gaussians *gaussians);
+
+/**
+ * Unit quaternions w, x, y, z that turn the Gaussian's axes to the vehicle's, float32 `[count][4]`. Lives as long
+ * as the Gaussians. NULL where there are none.
+ */
+VG_API
+const float *vg_gaussians_rotations(const struct vg_gaussians *gaussians);
+
+/**
+ * Peak opacities, float32 `[count]`, 0 to 1. Lives as long as the Gaussians. NULL where there are none.
+ */
+VG_API
+const float *vg_gaussians_opacities(const struct vg_gaussians *gaussians);
+
+/**
+ * Coefficients of spherical harmonics, float32 `[count][(sh_degree + 1)^2][3]`, R G B innermost. Lives as long as
+ * the Gaussians. NULL where there are none.
+ */
+VG_API
+const float *vg_gaussians_sh(const struct vg_gaussians *gaussians);
+
+/**
+ * Reads Gaussians from a PLY file in the layout of 3D Gaussian Splatting.
+ *
+ * - path: not NULL.
+ * - out: receives the Gaussians; the caller frees them. NULL on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_gaussians_load_ply(const char *path,
+                                struct vg_gaussians **out,
+                                struct vg_error **out_error);
+
+/**
+ * Writes Gaussians as a PLY file in the layout of 3D Gaussian Splatting. A file that is there is replaced once the
+ * new one is complete; on failure it is as it was.
+ *
+ * - gaussians, path: not NULL.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_gaussians_save_ply(const struct vg_gaussians *gaussians,
+                                const char *path,
+                                struct vg_error **out_error);
+
+/**
+ * Gaussians from the caller's arrays, which are copied and checked.
+ *
+ * - arrays: not NULL.
+ * - out: receives the Gaussians; the caller frees them. NULL on failure.
+ * - out_error: NULL, or receives the error, which names array and index.
+ */
+VG_API
+vg_status vg_gaussians_from_arrays(const struct vg_gaussian_arrays *arrays,
+                                   struct vg_gaussians **out,
+                                   struct vg_error **out_error);
+
+/**
+ * Gaussians moved to another frame: p becomes S p, rotations, scales and colours follow. Keep world placements of
+ * UTM size in a pose of your own: a float32 resolves a millimetre up to 16 km from the origin, and what lies beyond
+ * is refused.
+ *
+ * - gaussians: not NULL; they stay as they are.
+ * - to_from_vehicle: 16 numbers, a row-major 4x4 similarity: rotation, positive scale, translation in metres.
+ * - out: receives the Gaussians; the caller frees them. NULL on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_gaussians_transform(const struct vg_gaussians *gaussians,
+                                 const double *to_from_vehicle,
+                                 struct vg_gaussians **out,
+                                 struct vg_error **out_error);
+
+/**
+ * The mirror image across the vehicle's plane of symmetry, y = 0. Mirrored twice, the bytes are the same.
+ *
+ * - gaussians: not NULL; they stay as they are.
+ * - out: receives the Gaussians; the caller frees them. NULL on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_gaussians_mirror(const struct vg_gaussians *gaussians,
+                              struct vg_gaussians **out,
+                              struct vg_error **out_error);
+
+/**
+ * All of `first`, then all of `second`, in one. The degree is the higher of the two; missing bands are zero.
+ *
+ * - first, second: not NULL; may be the same; they stay as they are.
+ * - out: receives the Gaussians; the caller frees them. NULL on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_gaussians_merge(const struct vg_gaussians *first,
+                             const struct vg_gaussians *second,
+                             struct vg_gaussians **out,
+                             struct vg_error **out_error);
+
+/**
+ * Frees Gaussians. Pointers into them end. NULL: nothing happens.
+ */
+VG_API
+void vg_gaussians_free(struct vg_gaussians *gaussians);
+
+/**
+ * Makes a complete vehicle of photographs of one side.
+ *
+ * - views, view_count: 1 to 4096 views; nothing they point to is changed, or looked at after the call.
+ * - options: NULL for the default values.
+ * - out_gaussians: receives the vehicle; the caller frees it. NULL on failure.
+ * - out_report: NULL, or receives the report; the caller frees it. NULL on failure.
+ * - out_error: NULL, or receives the error.
+ *
+ * The same views and options give the same bytes with any number of threads.
+ */
+VG_API
+vg_status vg_reconstruct(const struct vg_view *views,
+                         size_t view_count,
+                         const struct vg_options *options,
+                         struct vg_gaussians **out_gaussians,
+                         struct vg_report **out_report,
+                         struct vg_error **out_error);
+
+/**
+ * Sets `*options` to the default values. `size`: `sizeof *options`.
+ */
+VG_API
+vg_status vg_render_options_init(struct vg_render_options *options,
+                                 size_t size);
+
+/**
+ * Sets `*target` to an RGBA8 target without memory. `size`: `sizeof *target`.
+ */
+VG_API
+vg_status vg_image_target_init(struct vg_image_target *target,
+                               size_t size);
+
+/**
+ * Draws Gaussians as a camera sees them, through its lens.
+ *
+ * - gaussians: not NULL. Any number of threads may render them at a time.
+ * - camera: not NULL.
+ * - options: NULL for the default values.
+ * - target: not NULL; the memory it points to is written on success only.
+ * - out_error: NULL, or receives the error.
+ *
+ * The same arguments give the same bytes with any number of threads.
+ */
+VG_API
+vg_status vg_render(const struct vg_gaussians *gaussians,
+                    const struct vg_camera *camera,
+                    const struct vg_render_options *options,
+                    const struct vg_image_target *target,
+                    struct vg_error **out_error);
+
+/**
+ * Sets `*options` to the default values. `size`: `sizeof *options`.
+ */
+VG_API
+vg_status vg_scene_options_init(struct vg_scene_options *options,
+                                size_t size);
+
+/**
+ * Reads a COLMAP folder: a model (binary or text) in `sparse/0`, in `sparse` or in the folder itself, photographs
+ * in `images`, masks in `masks`, depth in `depth`.
+ *
+ * - path: the folder; not NULL.
+ * - options: not NULL, because a COLMAP model needs `vehicle_from_world`.
+ * - out: receives the scene; the caller frees it. NULL on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_colmap_open(const char *path,
+                         const struct vg_scene_options *options,
+                         struct vg_scene **out,
+                         struct vg_error **out_error);
+
+/**
+ * Reads a nerfstudio scene: a `transforms.json`, or a folder with one.
+ *
+ * - path: the file or folder; not NULL.
+ * - options: NULL for the default values.
+ * - out: receives the scene; the caller frees it. NULL on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_transforms_open(const char *path,
+                             const struct vg_scene_options *options,
+                             struct vg_scene **out,
+                             struct vg_error **out_error);
+
+/**
+ * How many views a scene has. NULL: 0.
+ */
+VG_API
+size_t vg_scene_view_count(const struct vg_scene *scene);
+
+/**
+ * A view of a scene, for `vg_reconstruct` and `vg_render`. Its pointers live as long as the scene.
+ *
+ * - scene: not NULL.
+ * - index: below `vg_scene_view_count`.
+ * - out: a view that `vg_view_init` was called for; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_scene_get_view(const struct vg_scene *scene,
+                            size_t index,
+                            struct vg_view *out,
+                            struct vg_error **out_error);
+
+/**
+ * Frees a scene. Pointers into it end. NULL: nothing happens.
+ */
+VG_API
+void vg_scene_free(struct vg_scene *scene);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* VG_H */

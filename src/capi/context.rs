@@ -1,0 +1,121 @@
+//! What outlives a call: worker threads and the renderer's memory.
+
+use super::guard::{clear, guarded, guarded_value};
+use super::read::{self, Versioned};
+use super::status::{vg_error, vg_status};
+use crate::error::Result;
+use crate::progress::Threads;
+use crate::render::{CpuRenderer, Rendered};
+use std::sync::{Mutex, PoisonError};
+
+/// Worker threads and scratch memory, made once and named in the options of calls, so that a call neither starts
+/// threads nor allocates what the last one had. Any number of threads may use one context at a time. Free it with
+/// `vg_context_free`, after the last call that uses it has returned; results do not depend on it.
+pub struct vg_context {
+    _private: [u8; 0],
+}
+
+/// Settings of a context.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(test, safer_ffi::derive_ReprC)]
+pub struct vg_context_options {
+    /// `sizeof(vg_context_options)`.
+    pub struct_size: usize,
+    /// Worker threads, 1 to 1024; 0: one per core. The calling thread waits while they work.
+    pub threads: u32,
+    /// Reserved: 0.
+    pub flags: u32,
+}
+
+unsafe impl Versioned for vg_context_options {
+    const NAME: &'static str = "vg_context_options";
+    const FIRST_SIZE: usize = 16;
+
+    fn initial() -> Self {
+        Self { struct_size: size_of::<Self>(), threads: 0, flags: 0 }
+    }
+}
+
+/// What a `vg_context` points to.
+pub(super) struct Workshop {
+    pub(super) threads: Threads,
+    pub(super) renderer: CpuRenderer,
+    pictures: Mutex<Vec<Rendered>>,
+}
+
+impl Workshop {
+    pub(super) fn new(threads: usize) -> Result<Self> {
+        let (renderer, pictures) = (CpuRenderer::new(), Mutex::default());
+        Ok(Self { threads: Threads::new(threads)?, renderer, pictures })
+    }
+
+    /// Runs `work` with a picture whose memory is kept for the next time.
+    pub(super) fn with_picture<T>(&self, work: impl FnOnce(&mut Rendered) -> T) -> T {
+        // A panic elsewhere cannot leave a list of spare pictures in a state that matters.
+        let mut picture =
+            self.pictures.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
+        let result = work(&mut picture);
+        self.pictures.lock().unwrap_or_else(PoisonError::into_inner).push(picture);
+        result
+    }
+}
+
+/// Runs `work` in the caller's context, or in one made for this call where it is NULL.
+pub(super) unsafe fn in_context<T>(
+    context: *const vg_context,
+    work: impl FnOnce(&Workshop) -> Result<T>,
+) -> Result<T> {
+    match unsafe { context.cast::<Workshop>().as_ref() } {
+        Some(workshop) => work(workshop),
+        None => work(&Workshop::new(0)?),
+    }
+}
+
+/// Sets `*options` to the default values. `size`: `sizeof *options`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_context_options_init(options: *mut vg_context_options, size: usize) -> vg_status {
+    unsafe { guarded(std::ptr::null_mut(), || read::initialize("options", options, size)) }
+}
+
+/// Makes a context.
+///
+/// - options: NULL for the default values.
+/// - out: receives the context; the caller frees it.
+/// - out_error: NULL, or receives the error; NULL on success.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_context_new(
+    options: *const vg_context_options,
+    out: *mut *mut vg_context,
+    out_error: *mut *mut vg_error,
+) -> vg_status {
+    unsafe {
+        clear(out);
+        guarded(out_error, || {
+            read::not_null("out", out, "where to put the context")?;
+            let options = read::optional("options", options)?;
+            read::zero("options.flags", options.flags == 0)?;
+            let workshop = Workshop::new(options.threads as usize)?;
+            out.write(Box::into_raw(Box::new(workshop)).cast());
+            Ok(())
+        })
+    }
+}
+
+/// How many worker threads a context has. NULL: 0.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_context_threads(context: *const vg_context) -> u32 {
+    guarded_value(0, || {
+        unsafe { context.cast::<Workshop>().as_ref() }.map_or(0, |w| w.threads.count() as u32)
+    })
+}
+
+/// Ends the context's threads and frees its memory. No call may be using it. NULL: nothing happens.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_context_free(context: *mut vg_context) {
+    guarded_value((), || {
+        if !context.is_null() {
+            drop(unsafe { Box::from_raw(context.cast::<Workshop>()) });
+        }
+    });
+}

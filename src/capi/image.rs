@@ -1,0 +1,164 @@
+//! Pictures in the caller's memory.
+
+use super::read;
+use crate::error::{Error, Result};
+use crate::scene::{DepthMap, Mask, PixelFormat, RgbImage};
+use std::ffi::c_void;
+
+/// What a pixel holds. 8-bit channels are sRGB-encoded, as cameras and picture files have them.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum vg_format {
+    /// uint8 R, G, B.
+    Rgb8 = 1,
+    /// uint8 B, G, R (OpenCV).
+    Bgr8 = 2,
+    /// uint8 R, G, B, A; alpha is straight.
+    Rgba8 = 3,
+    /// uint8 B, G, R, A; alpha is straight.
+    Bgra8 = 4,
+    /// uint8 luminance; the format of masks.
+    Gray8 = 5,
+    /// float32 R, G, B, A; sRGB-encoded, 0 to 1.
+    Rgba32f = 6,
+    /// float32 planar depth along the optical axis, metres; 0, negative, NaN and infinite mean no measurement.
+    Depth32f = 7,
+}
+
+/// A picture that the library reads during the call and does not keep. All zero: no picture.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(test, safer_ffi::derive_ReprC)]
+pub struct vg_image {
+    /// The first pixel of the top row. Any alignment. NULL: no picture; the other fields are not looked at.
+    pub data: *const c_void,
+    /// Bytes from one row to the next (`cv::Mat::step`, ROS `Image.step`); 0: rows without gaps.
+    pub row_stride: usize,
+    /// Columns; must equal the camera's.
+    pub width: u32,
+    /// Rows; must equal the camera's.
+    pub height: u32,
+    /// A `vg_format`.
+    pub format: i32,
+    /// Reserved: 0.
+    pub flags: u32,
+}
+
+impl vg_image {
+    pub(super) const NONE: Self =
+        Self { data: std::ptr::null(), row_stride: 0, width: 0, height: 0, format: 0, flags: 0 };
+}
+
+const PIXELS: [(i32, &str, PixelFormat); 5] = [
+    (vg_format::Rgb8 as i32, "RGB8", PixelFormat::Rgb8),
+    (vg_format::Bgr8 as i32, "BGR8", PixelFormat::Bgr8),
+    (vg_format::Rgba8 as i32, "RGBA8", PixelFormat::Rgba8),
+    (vg_format::Bgra8 as i32, "BGRA8", PixelFormat::Bgra8),
+    (vg_format::Gray8 as i32, "GRAY8", PixelFormat::Gray8),
+];
+
+/// Pixels in the caller's memory, lent for the length of a call.
+struct Lent {
+    data: *const u8,
+    len: usize,
+}
+
+// SAFETY: the caller promised that nobody writes to the pixels during the call.
+unsafe impl Send for Lent {}
+unsafe impl Sync for Lent {}
+
+impl AsRef<[u8]> for Lent {
+    fn as_ref(&self) -> &[u8] {
+        // SAFETY: checked by `bytes`; whoever holds this is gone when the call returns.
+        unsafe { std::slice::from_raw_parts(self.data, self.len) }
+    }
+}
+
+/// The colours of a picture, and its alpha as a mask where it has one. RGB8 without gaps is not copied: the result
+/// must not outlive the call.
+pub(super) unsafe fn photograph(argument: &str, image: &vg_image) -> Result<(RgbImage, Option<Mask>)> {
+    read::not_null(&format!("{argument}.data"), image.data, "the picture's pixels")?;
+    read::zero(&format!("{argument}.flags"), image.flags == 0)?;
+    let format = read::choice(&format!("{argument}.format"), image.format, &PIXELS)?;
+    let (bytes, stride) = unsafe { bytes(argument, image, format.bytes_per_pixel())? };
+    let (width, height) = (image.width, image.height);
+    if format == PixelFormat::Rgb8 && stride == width as usize * 3 {
+        let lent = Lent { data: bytes.as_ptr(), len: bytes.len() };
+        return Ok((RgbImage::from_owner(argument, width, height, lent)?, None));
+    }
+    let picture = RgbImage::from_strided(argument, bytes, width, height, stride, format)?;
+    let mask = match format {
+        PixelFormat::Rgba8 | PixelFormat::Bgra8 => {
+            let row = |v: usize| &bytes[v * stride..][..width as usize * 4];
+            let alpha: Vec<u8> =
+                (0..height as usize).flat_map(|v| row(v).chunks_exact(4).map(|p| p[3])).collect();
+            Some(Mask::from_strided(argument, &alpha, width, height, width as usize)?)
+        }
+        _ => None,
+    };
+    Ok((picture, mask))
+}
+
+/// A mask, where there is one.
+pub(super) unsafe fn mask(argument: &str, image: &vg_image) -> Result<Option<Mask>> {
+    if image.data.is_null() {
+        return Ok(None);
+    }
+    read::zero(&format!("{argument}.flags"), image.flags == 0)?;
+    let only = [(vg_format::Gray8 as i32, "GRAY8", ())];
+    read::choice(&format!("{argument}.format"), image.format, &only)?;
+    let (bytes, stride) = unsafe { bytes(argument, image, 1)? };
+    Mask::from_strided(argument, bytes, image.width, image.height, stride).map(Some)
+}
+
+/// A depth map, where there is one.
+pub(super) unsafe fn depth(argument: &str, image: &vg_image) -> Result<Option<DepthMap>> {
+    const FLOAT: usize = size_of::<f32>();
+    if image.data.is_null() {
+        return Ok(None);
+    }
+    read::zero(&format!("{argument}.flags"), image.flags == 0)?;
+    let only = [(vg_format::Depth32f as i32, "DEPTH32F", ())];
+    read::choice(&format!("{argument}.format"), image.format, &only)?;
+    let (bytes, stride) = unsafe { bytes(argument, image, FLOAT)? };
+    let row = |v: usize| &bytes[v * stride..][..image.width as usize * FLOAT];
+    // Read bytewise: rows need not be aligned to floats.
+    let depth = (0..image.height as usize)
+        .flat_map(|v| row(v).chunks_exact(FLOAT).map(|b| f32::from_ne_bytes([b[0], b[1], b[2], b[3]])));
+    DepthMap::new(image.width, image.height, depth.collect()).map(Some)
+}
+
+/// All bytes from the first to the last pixel, and the stride, after checking that they can be counted.
+unsafe fn bytes<'a>(argument: &str, image: &vg_image, pixel: usize) -> Result<(&'a [u8], usize)> {
+    let (len, stride) = extent(argument, image.width, image.height, image.row_stride, pixel)?;
+    Ok((unsafe { std::slice::from_raw_parts(image.data.cast(), len) }, stride))
+}
+
+/// Bytes from the first pixel to the end of the last, and the stride, of a picture of such a size.
+pub(super) fn extent(
+    argument: &str,
+    width: u32,
+    height: u32,
+    row_stride: usize,
+    pixel: usize,
+) -> Result<(usize, usize)> {
+    use crate::geometry::camera::MAX_SIDE;
+    if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
+        return Err(Error::argument(
+            argument,
+            format!("{width}x{height}"),
+            format!("1x1 to {MAX_SIDE}x{MAX_SIDE}"),
+        ));
+    }
+    let row = width as usize * pixel;
+    let stride = if row_stride == 0 { row } else { row_stride };
+    let len = (height as usize - 1).checked_mul(stride).and_then(|n| n.checked_add(row));
+    match len.filter(|&n| stride >= row && isize::try_from(n).is_ok()) {
+        Some(len) => Ok((len, stride)),
+        None => Err(Error::argument(
+            format!("{argument}.row_stride"),
+            format!("{row_stride} bytes"),
+            format!("0, or at least {row} bytes for {width} pixels of {pixel}, and {height} rows that fit into memory"),
+        )),
+    }
+}

@@ -1,0 +1,58 @@
+//! The C face. `include/vg.h` is generated from this folder, doc comments included, and is written for readers of C.
+//!
+//! Every function does the same four things: sets its out parameters to NULL, reads what it was given into the
+//! library's own types ([`read`]), calls the library, and hands the result out. All of it happens behind one panic
+//! guard ([`guard`]). Algorithms live elsewhere.
+//!
+//! Rules that keep old programs running: functions and enumerators are added, never changed or removed; a struct
+//! that may grow begins with its size and grows at its end; enumerations travel as `int32_t`. `tests/abi` holds all
+//! of it to golden files.
+
+// The one place where the library dereferences what a caller promised; `docs/ABI.md` says how it is tested.
+#![allow(unsafe_code)]
+#![allow(non_camel_case_types)]
+// What callers must keep to is the same for all functions and stands in the header's first chapter.
+#![allow(clippy::missing_safety_doc)]
+
+mod guard;
+mod read;
+
+mod version;
+
+mod status;
+
+mod context;
+
+mod image;
+
+mod camera;
+
+mod view;
+
+mod options;
+
+mod report;
+
+mod gaussians;
+
+mod reconstruct;
+
+mod render;
+
+mod scene;
+
+#[cfg(test)]
+mod tests;
+
+pub use camera::*;
+pub use context::*;
+pub use gaussians::*;
+pub use image::*;
+pub use options::*;
+pub use reconstruct::*;
+pub use render::*;
+pub use report::*;
+pub use scene::*;
+pub use status::*;
+pub use version::*;
+pub use view::*;

@@ -1,0 +1,205 @@
+//! Settings of a reconstruction, and callbacks.
+
+use super::context::vg_context;
+use super::guard::guarded;
+use super::read::{self, Versioned};
+use super::status::vg_status;
+use crate::error::{Error, Result};
+use crate::pipeline::{Keep, Options, PriorChoice};
+use crate::symmetry::SymmetryMode;
+use std::ffi::{CString, c_char, c_void};
+
+/// Where metric depth comes from.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum vg_prior {
+    /// `VG_PRIOR_GIVEN` if every used view has depth, else `VG_PRIOR_HULL`.
+    Auto = 0,
+    /// The depth in the views.
+    Given = 1,
+    /// The hull of the silhouettes and their mirrored twins; needs masks and nothing else.
+    Hull = 2,
+    /// A network run by ONNX Runtime. `VG_STATUS_NOT_BUILT` in a build without it.
+    Onnx = 3,
+}
+
+/// How the side that was not photographed is completed across the plane y = 0.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum vg_symmetry {
+    /// What no view observed is mirrored; what was observed much better on the other side gives way.
+    Auto = 0,
+    /// The side with more Gaussians replaces the other, whatever was observed there.
+    Always = 1,
+    /// Nothing is mirrored.
+    Never = 2,
+}
+
+/// What may not be left out although the scene does not need it; bits of `vg_options.keep`.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum vg_keep {
+    /// Views whose camera another view already has.
+    DuplicateViews = 1,
+    /// Pixels that another view shows at a higher resolution.
+    Overlap = 2,
+    /// Pixels on the silhouette's edge.
+    SilhouetteEdge = 4,
+    /// Floating pixels at depth edges.
+    Floaters = 8,
+    /// Bands of colour that the spread of viewing directions cannot support.
+    ShBands = 16,
+}
+
+/// How important a log line is.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum vg_log_level {
+    /// Legal, but looks like a mistake.
+    Warning = 1,
+    /// What was done or left out.
+    Info = 2,
+    /// Times of stages.
+    Debug = 3,
+}
+
+/// Called on the calling thread at every stage boundary and inside long stages: the stage's name, how much of it is
+/// done, 0 to 1, and the caller's pointer. Returns 0 to go on; anything else ends the call with
+/// `VG_STATUS_CANCELLED`. May call the library; may not throw or jump out.
+pub type vg_progress_fn =
+    Option<unsafe extern "C" fn(stage: *const c_char, fraction: f64, user: *mut c_void) -> i32>;
+
+/// Called on the calling thread with a `vg_log_level` and one line of UTF-8 that lives until it returns. May call
+/// the library; may not throw or jump out.
+pub type vg_log_fn = Option<unsafe extern "C" fn(level: i32, message: *const c_char, user: *mut c_void)>;
+
+/// Settings of `vg_reconstruct`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(test, safer_ffi::derive_ReprC)]
+pub struct vg_options {
+    /// `sizeof(vg_options)`.
+    pub struct_size: usize,
+    /// Threads and memory to use. NULL: made for this call, one thread per core.
+    pub context: *mut vg_context,
+    /// A `vg_prior`. Default `VG_PRIOR_AUTO`.
+    pub prior: i32,
+    /// A `vg_symmetry`. Default `VG_SYMMETRY_AUTO`.
+    pub symmetry: i32,
+    /// Highest degree of the colour's spherical harmonics, 0 to 3. Default 2.
+    pub sh_degree: i32,
+    /// Bits of `vg_keep`. Default 0.
+    pub keep: u32,
+    /// 1: draw the model into its input views and report the error there; 0: do not. Default 1.
+    pub check: i32,
+    /// 1: the report also holds the metric coloured point cloud; 0: it does not. Default 0.
+    pub points: i32,
+    /// Length, width, height of the vehicle in metres, each 0.1 to 30; all 0: not known. Default 0, 0, 0.
+    pub vehicle_size: [f64; 3],
+    /// NULL: none.
+    pub progress: vg_progress_fn,
+    /// Handed to `progress`.
+    pub progress_user: *mut c_void,
+    /// NULL: none.
+    pub log: vg_log_fn,
+    /// Handed to `log`.
+    pub log_user: *mut c_void,
+}
+
+unsafe impl Versioned for vg_options {
+    const NAME: &'static str = "vg_options";
+    const FIRST_SIZE: usize = 96;
+
+    fn initial() -> Self {
+        Self {
+            struct_size: size_of::<Self>(),
+            context: std::ptr::null_mut(),
+            prior: vg_prior::Auto as i32,
+            symmetry: vg_symmetry::Auto as i32,
+            sh_degree: 2,
+            keep: 0,
+            check: 1,
+            points: 0,
+            vehicle_size: [0.0; 3],
+            progress: None,
+            progress_user: std::ptr::null_mut(),
+            log: None,
+            log_user: std::ptr::null_mut(),
+        }
+    }
+}
+
+impl vg_options {
+    pub(super) fn to_options(self) -> Result<Options> {
+        let priors = [
+            (vg_prior::Auto as i32, "auto", Some(PriorChoice::Auto)),
+            (vg_prior::Given as i32, "given", Some(PriorChoice::Given)),
+            (vg_prior::Hull as i32, "hull", Some(PriorChoice::Hull)),
+            (vg_prior::Onnx as i32, "onnx", None),
+        ];
+        let prior = read::choice("options.prior", self.prior, &priors)?.ok_or_else(|| Error::NotBuilt {
+            argument: "options.prior".into(),
+            found: "onnx".into(),
+            remedy: "this version has auto, given and hull".into(),
+        })?;
+        let symmetries = [
+            (vg_symmetry::Auto as i32, "auto", SymmetryMode::Auto),
+            (vg_symmetry::Always as i32, "always", SymmetryMode::Always),
+            (vg_symmetry::Never as i32, "never", SymmetryMode::Never),
+        ];
+        let unknown_size = self.vehicle_size == [0.0; 3];
+        Ok(Options {
+            prior,
+            symmetry: read::choice("options.symmetry", self.symmetry, &symmetries)?,
+            vehicle_size: (!unknown_size).then_some(self.vehicle_size),
+            sh_degree: sh_degree("options.sh_degree", self.sh_degree)?,
+            keep: keep(self.keep)?,
+            check: read::flag("options.check", self.check)?,
+            points: read::flag("options.points", self.points)?,
+            threads: 0,
+        })
+    }
+}
+
+pub(super) fn sh_degree(argument: &str, degree: i32) -> Result<u8> {
+    match u8::try_from(degree) {
+        Ok(degree @ 0..=3) => Ok(degree),
+        _ => Err(Error::argument(argument, degree.to_string(), "0 to 3")),
+    }
+}
+
+fn keep(bits: u32) -> Result<Keep> {
+    let has = |bit: vg_keep| bits & bit as u32 != 0;
+    if bits > 31 {
+        return Err(Error::argument("options.keep", format!("{bits:#x}"), "bits of vg_keep, 0 to 31"));
+    }
+    Ok(Keep {
+        duplicate_views: has(vg_keep::DuplicateViews),
+        overlap: has(vg_keep::Overlap),
+        silhouette_edge: has(vg_keep::SilhouetteEdge),
+        floaters: has(vg_keep::Floaters),
+        sh_bands: has(vg_keep::ShBands),
+    })
+}
+
+/// The caller's log, or nobody.
+#[derive(Clone, Copy)]
+pub(super) struct Log {
+    pub(super) callback: vg_log_fn,
+    pub(super) user: *mut c_void,
+}
+
+impl Log {
+    pub(super) unsafe fn line(self, level: vg_log_level, line: impl FnOnce() -> String) {
+        if let Some(callback) = self.callback {
+            let text: CString = super::status::c_string(line());
+            unsafe { callback(level as i32, text.as_ptr(), self.user) };
+        }
+    }
+}
+
+/// Sets `*options` to the default values. `size`: `sizeof *options`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_options_init(options: *mut vg_options, size: usize) -> vg_status {
+    unsafe { guarded(std::ptr::null_mut(), || read::initialize("options", options, size)) }
+}

@@ -1,0 +1,219 @@
+//! Reading what callers hand in: structs that say their size, strings, arrays; and writing structs back.
+
+use crate::error::{Error, Result};
+use std::ffi::{CStr, c_char};
+use std::path::Path;
+
+/// A struct of the ABI that may grow.
+///
+/// # Safety
+/// `repr(C)`, no padding, valid for every pattern of bits, and its first field is `struct_size: usize`.
+pub(super) unsafe trait Versioned: Copy {
+    /// Its name in C.
+    const NAME: &'static str;
+
+    /// `sizeof` in the release that introduced it: no caller has a shorter one.
+    const FIRST_SIZE: usize;
+
+    /// What its `_init` function leaves.
+    fn initial() -> Self;
+}
+
+/// No struct will ever be this long; more is a `struct_size` that was not set.
+const MAX_SIZE: usize = 4096;
+
+/// A caller's struct of this library's length. What an older caller's lacks has its initial value; what a newer
+/// caller's has beyond must be zero, because it asks for what this library cannot do.
+pub(super) unsafe fn required<T: Versioned>(argument: &str, pointer: *const T) -> Result<T> {
+    if pointer.is_null() {
+        return Err(Error::argument(argument, "NULL", format!("a {}", T::NAME)));
+    }
+    let size = unsafe { struct_size(argument, pointer)? };
+    unsafe { sized(argument, pointer, size) }
+}
+
+/// The same where NULL means the initial values.
+pub(super) unsafe fn optional<T: Versioned>(argument: &str, pointer: *const T) -> Result<T> {
+    if pointer.is_null() { Ok(T::initial()) } else { unsafe { required(argument, pointer) } }
+}
+
+/// An array whose elements are as far apart as the caller's struct is long.
+pub(super) unsafe fn array<T: Versioned>(argument: &str, first: *const T, count: usize) -> Result<Vec<T>> {
+    if first.is_null() {
+        return Err(Error::argument(argument, "NULL", format!("an array of {}", T::NAME)));
+    }
+    let stride = unsafe { struct_size(&format!("{argument}[0]"), first)? };
+    if !stride.is_multiple_of(align_of::<T>()) {
+        let allowed = format!("a multiple of {} in an array", align_of::<T>());
+        return Err(Error::argument(format!("{argument}[0].struct_size"), stride.to_string(), allowed));
+    }
+    let mut elements = Vec::with_capacity(count);
+    for i in 0..count {
+        let element = unsafe { first.byte_add(i * stride) };
+        let name = format!("{argument}[{i}]");
+        let size = unsafe { struct_size(&name, element)? };
+        if size != stride {
+            let allowed = format!("{stride}, as in {argument}[0]");
+            return Err(Error::argument(format!("{name}.struct_size"), size.to_string(), allowed));
+        }
+        elements.push(unsafe { sized(&name, element, size)? });
+    }
+    Ok(elements)
+}
+
+/// Fills a caller's struct of any accepted length; its `struct_size` stays, what this library does not know of is
+/// set to zero.
+pub(super) unsafe fn fill<T: Versioned>(argument: &str, target: *mut T, value: &T) -> Result<()> {
+    if target.is_null() {
+        return Err(Error::argument(argument, "NULL", format!("a {}", T::NAME)));
+    }
+    let size = unsafe { struct_size(argument, target)? };
+    unsafe { write_sized(target, value, size) };
+    Ok(())
+}
+
+/// What every `_init` function does; `size` is the caller's `sizeof`.
+pub(super) unsafe fn initialize<T: Versioned>(argument: &str, target: *mut T, size: usize) -> Result<()> {
+    if target.is_null() {
+        return Err(Error::argument(argument, "NULL", format!("a {}", T::NAME)));
+    }
+    check_size::<T>("size", size)?;
+    unsafe {
+        write_sized(target, &T::initial(), size);
+        target.cast::<usize>().write_unaligned(size);
+    }
+    Ok(())
+}
+
+unsafe fn struct_size<T: Versioned>(argument: &str, pointer: *const T) -> Result<usize> {
+    let size = unsafe { pointer.cast::<usize>().read_unaligned() };
+    check_size::<T>(&format!("{argument}.struct_size"), size)?;
+    Ok(size)
+}
+
+fn check_size<T: Versioned>(argument: &str, size: usize) -> Result<()> {
+    if (T::FIRST_SIZE..=MAX_SIZE).contains(&size) {
+        return Ok(());
+    }
+    let allowed = format!("sizeof({}), at least {}", T::NAME, T::FIRST_SIZE);
+    Err(Error::argument(argument, size.to_string(), allowed))
+}
+
+unsafe fn sized<T: Versioned>(argument: &str, pointer: *const T, size: usize) -> Result<T> {
+    let known = size.min(size_of::<T>());
+    let mut value = T::initial();
+    // Bytewise, so that no alignment is asked of the caller.
+    unsafe {
+        std::ptr::copy_nonoverlapping(pointer.cast::<u8>(), (&raw mut value).cast::<u8>(), known);
+        (&raw mut value).cast::<usize>().write(size_of::<T>());
+    }
+    let beyond = unsafe { std::slice::from_raw_parts(pointer.cast::<u8>().add(known), size - known) };
+    if beyond.iter().any(|&byte| byte != 0) {
+        let found = format!("{size} bytes, and not all of those after the first {known} are zero");
+        let allowed = format!(
+            "what version {} of the library knows: {known} bytes, zero beyond",
+            env!("CARGO_PKG_VERSION")
+        );
+        return Err(Error::argument(argument, found, allowed));
+    }
+    Ok(value)
+}
+
+unsafe fn write_sized<T: Versioned>(target: *mut T, value: &T, size: usize) {
+    const SKIP: usize = size_of::<usize>();
+    let known = size.min(size_of::<T>());
+    unsafe {
+        let (from, to) = (std::ptr::from_ref(value).cast::<u8>(), target.cast::<u8>());
+        std::ptr::copy_nonoverlapping(from.add(SKIP), to.add(SKIP), known - SKIP);
+        to.add(known).write_bytes(0, size - known);
+    }
+}
+
+/// A handle or out parameter that must be there.
+pub(super) fn not_null<T>(argument: &str, pointer: *const T, what: &str) -> Result<()> {
+    if pointer.is_null() {
+        return Err(Error::argument(argument, "NULL", what));
+    }
+    Ok(())
+}
+
+/// A reference to what a handle points to.
+pub(super) unsafe fn handle<'a, T>(argument: &str, pointer: *const T, what: &str) -> Result<&'a T> {
+    unsafe { pointer.as_ref() }.ok_or_else(|| Error::argument(argument, "NULL", what))
+}
+
+/// A NUL-terminated UTF-8 string; `""` for NULL.
+pub(super) unsafe fn text<'a>(argument: &str, pointer: *const c_char) -> Result<&'a str> {
+    if pointer.is_null() {
+        return Ok("");
+    }
+    let bytes = unsafe { CStr::from_ptr(pointer) };
+    bytes.to_str().map_err(|_| {
+        Error::argument(argument, format!("{:?}", bytes.to_string_lossy()), "a UTF-8 string")
+    })
+}
+
+/// A path: NUL-terminated, not empty; any bytes where the system's paths are bytes, else UTF-8.
+pub(super) unsafe fn path<'a>(argument: &str, pointer: *const c_char) -> Result<&'a Path> {
+    if pointer.is_null() {
+        return Err(Error::argument(argument, "NULL", "a path"));
+    }
+    let bytes = unsafe { CStr::from_ptr(pointer) };
+    if bytes.is_empty() {
+        return Err(Error::argument(argument, "\"\"", "a path"));
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::ffi::OsStrExt;
+        Ok(Path::new(std::ffi::OsStr::from_bytes(bytes.to_bytes())))
+    }
+    #[cfg(not(unix))]
+    unsafe {
+        text(argument, pointer).map(Path::new)
+    }
+}
+
+/// `count` numbers the caller points to; an empty slice whatever the pointer is where `count` is 0.
+pub(super) unsafe fn numbers<'a, T>(argument: &str, pointer: *const T, count: usize) -> Result<&'a [T]> {
+    if count == 0 {
+        // `std::vector::data()` of an empty vector may be NULL.
+        return Ok(&[]);
+    }
+    if pointer.is_null() {
+        return Err(Error::argument(argument, "NULL", format!("{count} numbers")));
+    }
+    if !pointer.is_aligned() {
+        let allowed = format!("a multiple of {} bytes", align_of::<T>());
+        return Err(Error::argument(argument, format!("address {pointer:p}"), allowed));
+    }
+    if count.checked_mul(size_of::<T>()).is_none_or(|bytes| bytes > isize::MAX as usize) {
+        return Err(Error::argument(argument, format!("{count} numbers"), "what fits into memory"));
+    }
+    Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
+}
+
+/// Exactly `N` numbers, at any address.
+pub(super) unsafe fn fixed<const N: usize>(argument: &str, pointer: *const f64) -> Result<[f64; N]> {
+    if pointer.is_null() {
+        return Err(Error::argument(argument, "NULL", format!("{N} numbers")));
+    }
+    Ok(unsafe { pointer.cast::<[f64; N]>().read_unaligned() })
+}
+
+/// A number of an enumeration, checked.
+pub(super) fn choice<T: Copy>(argument: &str, number: i32, choices: &[(i32, &str, T)]) -> Result<T> {
+    choices.iter().find(|(n, ..)| *n == number).map(|(.., value)| *value).ok_or_else(|| {
+        let names: Vec<String> = choices.iter().map(|(n, name, _)| format!("{n} ({name})")).collect();
+        Error::argument(argument, number.to_string(), names.join(", "))
+    })
+}
+
+/// A yes or no that travels as a number.
+pub(super) fn flag(argument: &str, number: i32) -> Result<bool> {
+    choice(argument, number, &[(0, "no", false), (1, "yes", true)])
+}
+
+/// A field kept for later.
+pub(super) fn zero(argument: &str, is_zero: bool) -> Result<()> {
+    if is_zero { Ok(()) } else { Err(Error::argument(argument, "not zero", "zero: reserved")) }
+}

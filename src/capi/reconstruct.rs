@@ -1,0 +1,85 @@
+//! The main job.
+
+use super::context::{Workshop, in_context};
+use super::gaussians::{self, vg_gaussians};
+use super::guard::{clear, guarded};
+use super::options::{Log, vg_log_level, vg_options};
+use super::read;
+use super::report::{ReportObject, vg_report};
+use super::status::{c_string, vg_error, vg_status};
+use super::view::{self, vg_view};
+use crate::error::Result;
+use crate::pipeline::{self, Reconstruction, Report};
+use crate::progress::Progress;
+use crate::scene::Scene;
+use std::ops::ControlFlow;
+
+/// Makes a complete vehicle of photographs of one side.
+///
+/// - views, view_count: 1 to 4096 views; nothing they point to is changed, or looked at after the call.
+/// - options: NULL for the default values.
+/// - out_gaussians: receives the vehicle; the caller frees it. NULL on failure.
+/// - out_report: NULL, or receives the report; the caller frees it. NULL on failure.
+/// - out_error: NULL, or receives the error.
+///
+/// The same views and options give the same bytes with any number of threads.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_reconstruct(
+    views: *const vg_view,
+    view_count: usize,
+    options: *const vg_options,
+    out_gaussians: *mut *mut vg_gaussians,
+    out_report: *mut *mut vg_report,
+    out_error: *mut *mut vg_error,
+) -> vg_status {
+    unsafe {
+        clear(out_gaussians);
+        clear(out_report);
+        guarded(out_error, || {
+            read::not_null("out_gaussians", out_gaussians, "where to put the Gaussians")?;
+            let options = read::optional("options", options)?;
+            let settings = options.to_options()?;
+            let scene = view::scene(views, view_count)?;
+            let made = in_context(options.context, |shop| run(shop, &scene, &settings, &options))?;
+            out_gaussians.write(gaussians::into_raw(made.gaussians));
+            if !out_report.is_null() {
+                out_report.write(ReportObject::new(made.report, made.points).into_raw());
+            }
+            Ok(())
+        })
+    }
+}
+
+unsafe fn run(
+    shop: &Workshop,
+    scene: &Scene,
+    settings: &pipeline::Options,
+    options: &vg_options,
+) -> Result<Reconstruction> {
+    let mut progress = |progress: Progress| {
+        let Some(callback) = options.progress else { return ControlFlow::Continue(()) };
+        let stage = c_string(progress.stage.to_owned());
+        match unsafe { callback(stage.as_ptr(), progress.fraction, options.progress_user) } {
+            0 => ControlFlow::Continue(()),
+            _ => ControlFlow::Break(()),
+        }
+    };
+    let mut made = pipeline::reconstruct_on(&shop.threads, scene, settings, &mut progress)?;
+    made.report.settings.threads = shop.threads.count();
+    unsafe { log(Log { callback: options.log, user: options.log_user }, &made.report) };
+    Ok(made)
+}
+
+unsafe fn log(log: Log, report: &Report) {
+    unsafe {
+        for left in &report.left_out {
+            log.line(vg_log_level::Info, || format!("left out {} {}: {}", left.count, left.what, left.why));
+        }
+        for stage in &report.stages {
+            log.line(vg_log_level::Debug, || format!("{}: {:.1} ms", stage.name, stage.ms));
+        }
+        log.line(vg_log_level::Info, || {
+            format!("{} Gaussians from depth prior {} in {:.1} ms", report.gaussians, report.prior, report.total_ms)
+        });
+    }
+}

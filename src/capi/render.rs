@@ -1,0 +1,386 @@
+//! Pictures of Gaussians.
+
+use super::camera::{self, vg_camera};
+use super::context::{in_context, vg_context};
+use super::gaussians::{self, vg_gaussians};
+use super::guard::guarded;
+use super::image::{extent, vg_format};
+use super::options::sh_degree;
+use super::read::{self, Versioned};
+use super::status::{vg_error, vg_status};
+use crate::error::{Error, Result};
+use crate::render::{Background, DepthMode, RenderOptions, Rendered};
+use std::ffi::c_void;
+
+/// What draws.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum vg_backend {
+    /// What is best of what this build and this machine have.
+    Auto = 0,
+    /// The context's threads.
+    Cpu = 1,
+    /// A graphics processor. `VG_STATUS_NOT_BUILT` in a build without it.
+    Gpu = 2,
+}
+
+/// What shows where the vehicle does not.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum vg_background {
+    /// A colour; the picture is opaque, its alpha 1.
+    Color = 0,
+    /// Nothing; the picture's alpha is how much of the pixel the vehicle covers.
+    Transparent = 1,
+}
+
+/// What the colours of a picture with a transparent background are multiplied by.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum vg_alpha {
+    /// By nothing, as PNG files want it; 0 where alpha is 0.
+    Straight = 0,
+    /// By alpha, as compositing wants it.
+    Premultiplied = 1,
+}
+
+/// What a depth pixel means.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum vg_depth_mode {
+    /// Expected planar depth along the optical axis in metres; 0 where alpha is 0.
+    Expected = 0,
+    /// The same times alpha: the plain sum over the Gaussians.
+    Accumulated = 1,
+}
+
+/// Settings of `vg_render`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(test, safer_ffi::derive_ReprC)]
+pub struct vg_render_options {
+    /// `sizeof(vg_render_options)`.
+    pub struct_size: usize,
+    /// Threads and memory to use. NULL: made for this call, one thread per core; make one where pictures follow
+    /// each other.
+    pub context: *mut vg_context,
+    /// A `vg_backend`. Default `VG_BACKEND_AUTO`.
+    pub backend: i32,
+    /// A `vg_background`. Default `VG_BACKGROUND_COLOR`.
+    pub background: i32,
+    /// The colour, R G B, sRGB-encoded, each 0 to 1. Default white.
+    pub background_color: [f32; 3],
+    /// A `vg_alpha`; matters where the background is transparent. Default `VG_ALPHA_STRAIGHT`.
+    pub alpha: i32,
+    /// A `vg_depth_mode`. Default `VG_DEPTH_MODE_EXPECTED`.
+    pub depth_mode: i32,
+    /// Bands of colour above this degree are left out, 0 to 3. Default 3: all there are.
+    pub sh_degree: i32,
+    /// 1: compensate opacity for the blur; for pictures much smaller than the photographs. Default 0.
+    pub antialiased: i32,
+    /// Variance added to each projected Gaussian, pixels^2, 1e-4 to 100. Default 0.3.
+    pub blur: f32,
+    /// Gaussians whose centre is nearer along the optical axis are not drawn, metres, 1e-6 to 1e10. Default 0.01.
+    pub near_plane: f32,
+    /// Gaussians whose centre is farther are not drawn, metres, `near_plane` to 1e10. Default 1e10.
+    pub far_plane: f32,
+    /// Largest alpha of one Gaussian in one pixel, 0.01 to 0.9999. Default 0.99.
+    pub max_alpha: f32,
+    /// Reserved: 0.
+    pub flags: u32,
+}
+
+unsafe impl Versioned for vg_render_options {
+    const NAME: &'static str = "vg_render_options";
+    const FIRST_SIZE: usize = 72;
+
+    fn initial() -> Self {
+        let rust = RenderOptions::default();
+        Self {
+            struct_size: size_of::<Self>(),
+            context: std::ptr::null_mut(),
+            backend: vg_backend::Auto as i32,
+            background: vg_background::Color as i32,
+            background_color: [1.0; 3],
+            alpha: vg_alpha::Straight as i32,
+            depth_mode: vg_depth_mode::Expected as i32,
+            sh_degree: i32::from(rust.sh_degree),
+            antialiased: i32::from(rust.antialiased),
+            blur: rust.blur,
+            near_plane: rust.near,
+            far_plane: rust.far,
+            max_alpha: rust.max_alpha,
+            flags: 0,
+        }
+    }
+}
+
+/// Where `vg_render` puts the picture: colour, depth, or both.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(test, safer_ffi::derive_ReprC)]
+pub struct vg_image_target {
+    /// `sizeof(vg_image_target)`.
+    pub struct_size: usize,
+    /// Columns; must equal the camera's.
+    pub width: u32,
+    /// Rows; must equal the camera's.
+    pub height: u32,
+    /// The first pixel of the top row. Any alignment. NULL: no colour.
+    pub color: *mut c_void,
+    /// Bytes from one row to the next; 0: rows without gaps. What lies between rows is not touched.
+    pub color_row_stride: usize,
+    /// The first depth pixel of the top row, float32, see `vg_depth_mode`. Any alignment. NULL: no depth.
+    pub depth: *mut c_void,
+    /// Bytes from one row to the next; 0: rows without gaps.
+    pub depth_row_stride: usize,
+    /// RGBA8, BGRA8 or RGBA32F; with an opaque background RGB8 and BGR8 too.
+    pub color_format: i32,
+    /// Reserved: 0.
+    pub flags: u32,
+}
+
+unsafe impl Versioned for vg_image_target {
+    const NAME: &'static str = "vg_image_target";
+    const FIRST_SIZE: usize = 56;
+
+    fn initial() -> Self {
+        Self {
+            struct_size: size_of::<Self>(),
+            width: 0,
+            height: 0,
+            color: std::ptr::null_mut(),
+            color_row_stride: 0,
+            depth: std::ptr::null_mut(),
+            depth_row_stride: 0,
+            color_format: vg_format::Rgba8 as i32,
+            flags: 0,
+        }
+    }
+}
+
+/// Sets `*options` to the default values. `size`: `sizeof *options`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_render_options_init(options: *mut vg_render_options, size: usize) -> vg_status {
+    unsafe { guarded(std::ptr::null_mut(), || read::initialize("options", options, size)) }
+}
+
+/// Sets `*target` to an RGBA8 target without memory. `size`: `sizeof *target`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_image_target_init(target: *mut vg_image_target, size: usize) -> vg_status {
+    unsafe { guarded(std::ptr::null_mut(), || read::initialize("target", target, size)) }
+}
+
+/// Draws Gaussians as a camera sees them, through its lens.
+///
+/// - gaussians: not NULL. Any number of threads may render them at a time.
+/// - camera: not NULL.
+/// - options: NULL for the default values.
+/// - target: not NULL; the memory it points to is written on success only.
+/// - out_error: NULL, or receives the error.
+///
+/// The same arguments give the same bytes with any number of threads.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_render(
+    gaussians: *const vg_gaussians,
+    camera: *const vg_camera,
+    options: *const vg_render_options,
+    target: *const vg_image_target,
+    out_error: *mut *mut vg_error,
+) -> vg_status {
+    unsafe {
+        guarded(out_error, || {
+            let gaussians = gaussians::required("gaussians", gaussians)?;
+            let camera = camera::camera("camera", &read::required("camera", camera)?)?;
+            let options = read::optional("options", options)?;
+            let (settings, alpha) = options.read()?;
+            let target = Target::read(target, &settings, alpha, camera.width, camera.height)?;
+            in_context(options.context, |shop| {
+                shop.with_picture(|picture| {
+                    shop.threads
+                        .run(|| shop.renderer.render_into(gaussians, &camera, &settings, picture))?;
+                    target.write(picture);
+                    Ok(())
+                })
+            })
+        })
+    }
+}
+
+impl vg_render_options {
+    fn read(&self) -> Result<(RenderOptions, vg_alpha)> {
+        let backends = [
+            (vg_backend::Auto as i32, "auto", true),
+            (vg_backend::Cpu as i32, "cpu", true),
+            (vg_backend::Gpu as i32, "gpu", false),
+        ];
+        if !read::choice("options.backend", self.backend, &backends)? {
+            return Err(Error::NotBuilt {
+                argument: "options.backend".into(),
+                found: "gpu".into(),
+                remedy: "this version draws with auto or cpu".into(),
+            });
+        }
+        let backgrounds = [
+            (vg_background::Color as i32, "color", Background::Color(self.background_color)),
+            (vg_background::Transparent as i32, "transparent", Background::Transparent),
+        ];
+        let alphas = [
+            (vg_alpha::Straight as i32, "straight", vg_alpha::Straight),
+            (vg_alpha::Premultiplied as i32, "premultiplied", vg_alpha::Premultiplied),
+        ];
+        let depth_modes = [
+            (vg_depth_mode::Expected as i32, "expected", DepthMode::Expected),
+            (vg_depth_mode::Accumulated as i32, "accumulated", DepthMode::Accumulated),
+        ];
+        read::zero("options.flags", self.flags == 0)?;
+        let settings = RenderOptions {
+            background: read::choice("options.background", self.background, &backgrounds)?,
+            blur: self.blur,
+            antialiased: read::flag("options.antialiased", self.antialiased)?,
+            near: self.near_plane,
+            far: self.far_plane,
+            max_alpha: self.max_alpha,
+            sh_degree: sh_degree("options.sh_degree", self.sh_degree)?,
+            depth_mode: read::choice("options.depth_mode", self.depth_mode, &depth_modes)?,
+        };
+        settings.validate()?;
+        Ok((settings, read::choice("options.alpha", self.alpha, &alphas)?))
+    }
+}
+
+/// The caller's memory, checked.
+struct Target {
+    color: Option<(*mut u8, usize, Pixel)>,
+    depth: Option<(*mut u8, usize)>,
+}
+
+/// How a pixel is written.
+#[derive(Clone, Copy)]
+struct Pixel {
+    layout: Layout,
+    /// The picture's own alpha, or 1.
+    opaque: bool,
+    alpha: vg_alpha,
+}
+
+#[derive(Clone, Copy)]
+enum Layout {
+    Rgb8,
+    Bgr8,
+    Rgba8,
+    Bgra8,
+    Rgba32f,
+}
+
+impl Layout {
+    fn bytes(self) -> usize {
+        match self {
+            Self::Rgb8 | Self::Bgr8 => 3,
+            Self::Rgba8 | Self::Bgra8 => 4,
+            Self::Rgba32f => 16,
+        }
+    }
+}
+
+impl Target {
+    unsafe fn read(
+        target: *const vg_image_target,
+        settings: &RenderOptions,
+        alpha: vg_alpha,
+        width: u32,
+        height: u32,
+    ) -> Result<Self> {
+        let target = unsafe { read::required("target", target)? };
+        read::zero("target.flags", target.flags == 0)?;
+        if (target.width, target.height) != (width, height) {
+            let found = format!("{}x{}", target.width, target.height);
+            let allowed = format!("the camera's size, {width}x{height}");
+            return Err(Error::argument("target.size", found, allowed));
+        }
+        if target.color.is_null() && target.depth.is_null() {
+            return Err(Error::argument("target", "neither color nor depth", "at least one of them"));
+        }
+        let opaque = settings.background != Background::Transparent;
+        let color = match target.color.is_null() {
+            true => None,
+            false => {
+                let layout = layout(target.color_format, opaque)?;
+                let (_, stride) =
+                    extent("target.color", width, height, target.color_row_stride, layout.bytes())?;
+                Some((target.color.cast(), stride, Pixel { layout, opaque, alpha }))
+            }
+        };
+        let depth = match target.depth.is_null() {
+            true => None,
+            false => {
+                let bytes = size_of::<f32>();
+                let (_, stride) = extent("target.depth", width, height, target.depth_row_stride, bytes)?;
+                Some((target.depth.cast(), stride))
+            }
+        };
+        Ok(Self { color, depth })
+    }
+
+    /// Copies the picture row by row, through slices of one row each: the gaps are not ours.
+    unsafe fn write(&self, picture: &Rendered) {
+        let width = picture.width as usize;
+        for v in 0..picture.height as usize {
+            let row = v * width..(v + 1) * width;
+            if let Some((first, stride, pixel)) = self.color {
+                let len = width * pixel.layout.bytes();
+                let target = unsafe { std::slice::from_raw_parts_mut(first.add(v * stride), len) };
+                let source = picture.color[row.clone()].iter().zip(&picture.alpha[row.clone()]);
+                for (bytes, (color, alpha)) in target.chunks_exact_mut(pixel.layout.bytes()).zip(source) {
+                    pixel.write(bytes, *color, *alpha);
+                }
+            }
+            if let Some((first, stride)) = self.depth {
+                let len = width * size_of::<f32>();
+                let source = bytemuck::cast_slice(&picture.depth[row]);
+                let target = unsafe { std::slice::from_raw_parts_mut(first.add(v * stride), len) };
+                target.copy_from_slice(source);
+            }
+        }
+    }
+}
+
+fn layout(format: i32, opaque: bool) -> Result<Layout> {
+    let all = [
+        (vg_format::Rgba8 as i32, "RGBA8", Layout::Rgba8),
+        (vg_format::Bgra8 as i32, "BGRA8", Layout::Bgra8),
+        (vg_format::Rgba32f as i32, "RGBA32F", Layout::Rgba32f),
+        (vg_format::Rgb8 as i32, "RGB8", Layout::Rgb8),
+        (vg_format::Bgr8 as i32, "BGR8", Layout::Bgr8),
+    ];
+    // Without alpha there is no way to say that nothing is there.
+    read::choice("target.color_format", format, if opaque { &all } else { &all[..3] })
+}
+
+impl Pixel {
+    #[inline]
+    fn write(self, bytes: &mut [u8], premultiplied: [f32; 3], coverage: f32) {
+        let alpha = if self.opaque { 1.0 } else { coverage };
+        let scale = match self.alpha {
+            vg_alpha::Straight if alpha > 0.0 => 1.0 / alpha,
+            vg_alpha::Straight => 0.0,
+            vg_alpha::Premultiplied => 1.0,
+        };
+        let [r, g, b] = premultiplied.map(|c| c * scale);
+        let rgb8 = || [byte(r), byte(g), byte(b)];
+        match self.layout {
+            Layout::Rgb8 => bytes.copy_from_slice(&rgb8()),
+            Layout::Rgba8 => {
+                bytes[..3].copy_from_slice(&rgb8());
+                bytes[3] = byte(alpha);
+            }
+            Layout::Bgr8 => bytes.copy_from_slice(&[byte(b), byte(g), byte(r)]),
+            Layout::Bgra8 => bytes.copy_from_slice(&[byte(b), byte(g), byte(r), byte(alpha)]),
+            Layout::Rgba32f => bytes.copy_from_slice(bytemuck::bytes_of(&[r, g, b, alpha])),
+        }
+    }
+}
+
+fn byte(value: f32) -> u8 {
+    crate::render::output::to_u8(value)
+}

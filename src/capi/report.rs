@@ -1,0 +1,199 @@
+//! What a reconstruction did.
+
+use super::guard::{guarded, guarded_value};
+use super::options::vg_prior;
+use super::read::{self, Versioned};
+use super::status::{c_string, vg_error, vg_status};
+use crate::pipeline::{PointCloud, Report};
+use std::ffi::{CString, c_char};
+
+/// What a reconstruction did, how long it took, what it left out, and the error it can know. Owned by the caller,
+/// who frees it with `vg_report_free`; it never changes.
+pub struct vg_report {
+    _private: [u8; 0],
+}
+
+/// What a `vg_report` points to.
+pub(super) struct ReportObject {
+    report: Report,
+    json: CString,
+    points: PointCloud,
+}
+
+impl ReportObject {
+    pub(super) fn new(report: Report, points: Option<PointCloud>) -> Self {
+        let json = serde_json::to_string_pretty(&report)
+            .unwrap_or_else(|e| format!("{{\"error\": {:?}}}", e.to_string()));
+        Self { report, json: c_string(json), points: points.unwrap_or_default() }
+    }
+
+    pub(super) fn into_raw(self) -> *mut vg_report {
+        Box::into_raw(Box::new(self)).cast()
+    }
+}
+
+unsafe fn object<'a>(report: *const vg_report) -> Option<&'a ReportObject> {
+    unsafe { report.cast::<ReportObject>().as_ref() }
+}
+
+/// The main figures of a report.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(test, safer_ffi::derive_ReprC)]
+pub struct vg_report_figures {
+    /// `sizeof(vg_report_figures)`.
+    pub struct_size: usize,
+    /// Gaussians in the result.
+    pub gaussian_count: u64,
+    /// How many of them are mirror images.
+    pub mirrored_count: u64,
+    /// Views used; the JSON tells which, and why others were not.
+    pub views_used: u32,
+    /// Worker threads.
+    pub threads: u32,
+    /// The `vg_prior` that was used.
+    pub prior: i32,
+    /// Degree of the result's spherical harmonics.
+    pub sh_degree: i32,
+    /// Wall time of the call, milliseconds.
+    pub total_ms: f64,
+    /// Highest resident memory of the process so far, bytes; 0 where the system does not tell.
+    pub peak_rss_bytes: u64,
+    /// 1 if the three fields that follow hold the error on the input views, 0 if the check was switched off.
+    pub has_input_error: i32,
+    /// 1 if the prior worked in a box whose size follows below.
+    pub has_box: i32,
+    /// Mean PSNR over the used views, on white, full frame, dB.
+    pub input_psnr_db: f64,
+    /// Mean intersection over union of the model's silhouette and the masks.
+    pub input_silhouette_iou: f64,
+    /// Length, width, height of the box, metres.
+    pub box_size: [f64; 3],
+    /// Lowest corner of the Gaussians' centres, metres.
+    pub extent_low: [f64; 3],
+    /// Highest corner of the Gaussians' centres, metres.
+    pub extent_high: [f64; 3],
+}
+
+unsafe impl Versioned for vg_report_figures {
+    const NAME: &'static str = "vg_report_figures";
+    const FIRST_SIZE: usize = 152;
+
+    fn initial() -> Self {
+        Self {
+            struct_size: size_of::<Self>(),
+            gaussian_count: 0,
+            mirrored_count: 0,
+            views_used: 0,
+            threads: 0,
+            prior: 0,
+            sh_degree: 0,
+            total_ms: 0.0,
+            peak_rss_bytes: 0,
+            has_input_error: 0,
+            has_box: 0,
+            input_psnr_db: 0.0,
+            input_silhouette_iou: 0.0,
+            box_size: [0.0; 3],
+            extent_low: [0.0; 3],
+            extent_high: [0.0; 3],
+        }
+    }
+}
+
+impl vg_report_figures {
+    fn of(report: &Report) -> Self {
+        let prior = match report.prior {
+            "given" => vg_prior::Given,
+            "hull" => vg_prior::Hull,
+            _ => vg_prior::Auto,
+        };
+        let (low, high) = report.extent_m.unwrap_or_default();
+        Self {
+            gaussian_count: report.gaussians as u64,
+            mirrored_count: report.symmetry.cloned as u64,
+            views_used: report.views_used.len() as u32,
+            threads: report.threads as u32,
+            prior: prior as i32,
+            sh_degree: i32::from(report.sh_degree),
+            total_ms: report.total_ms,
+            peak_rss_bytes: report.peak_rss_bytes.unwrap_or(0),
+            has_input_error: i32::from(report.input_error.is_some()),
+            has_box: i32::from(report.vehicle_box.is_some()),
+            input_psnr_db: report.input_error.map_or(0.0, |e| e.psnr_db),
+            input_silhouette_iou: report.input_error.map_or(0.0, |e| e.silhouette_iou),
+            box_size: report.vehicle_box.map_or([0.0; 3], |b| b.size_m),
+            extent_low: low.map(f64::from),
+            extent_high: high.map(f64::from),
+            ..Self::initial()
+        }
+    }
+}
+
+/// Sets `*figures` to zeros. `size`: `sizeof *figures`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_report_figures_init(figures: *mut vg_report_figures, size: usize) -> vg_status {
+    unsafe { guarded(std::ptr::null_mut(), || read::initialize("figures", figures, size)) }
+}
+
+/// The main figures.
+///
+/// - report: not NULL.
+/// - out: a struct that `vg_report_figures_init` was called for; unchanged on failure.
+/// - out_error: NULL, or receives the error.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_report_get_figures(
+    report: *const vg_report,
+    out: *mut vg_report_figures,
+    out_error: *mut *mut vg_error,
+) -> vg_status {
+    unsafe {
+        guarded(out_error, || {
+            let object = read::handle("report", report.cast::<ReportObject>(), "a report")?;
+            read::fill("out", out, &vg_report_figures::of(&object.report))
+        })
+    }
+}
+
+/// The whole report as JSON. Lives as long as the report. NULL: an empty string. Never NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_report_json(report: *const vg_report) -> *const c_char {
+    guarded_value(c"".as_ptr(), || unsafe { object(report) }.map_or(c"".as_ptr(), |r| r.json.as_ptr()))
+}
+
+/// How many points the metric coloured point cloud has; 0 unless `vg_options.points` was 1. NULL: 0.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_report_point_count(report: *const vg_report) -> usize {
+    guarded_value(0, || unsafe { object(report) }.map_or(0, |r| r.points.positions.len()))
+}
+
+/// Positions of the points, float32 `[count][3]`, metres, vehicle frame. Lives as long as the report. NULL where
+/// there are none.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_report_point_positions(report: *const vg_report) -> *const f32 {
+    guarded_value(std::ptr::null(), || {
+        unsafe { object(report) }
+            .filter(|r| !r.points.positions.is_empty())
+            .map_or(std::ptr::null(), |r| r.points.positions.as_ptr().cast())
+    })
+}
+
+/// Colours of the points, uint8 `[count][3]`, sRGB. Lives as long as the report. NULL where there are none.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_report_point_colors(report: *const vg_report) -> *const u8 {
+    guarded_value(std::ptr::null(), || {
+        unsafe { object(report) }
+            .filter(|r| !r.points.colors.is_empty())
+            .map_or(std::ptr::null(), |r| r.points.colors.as_ptr().cast())
+    })
+}
+
+/// Frees a report. NULL: nothing happens.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_report_free(report: *mut vg_report) {
+    guarded_value((), || {
+        if !report.is_null() {
+            drop(unsafe { Box::from_raw(report.cast::<ReportObject>()) });
+        }
+    });
+}

@@ -1,0 +1,109 @@
+//! What functions return, and the error object that says why.
+
+use super::guard::{Failure, guarded_value};
+use crate::error::Error;
+use std::ffi::{CString, c_char};
+
+/// What a function returns. Numbers are never reused; later versions may add some, so treat an unknown one as a
+/// failure.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum vg_status {
+    /// Done.
+    Ok = 0,
+    /// An argument is outside what the function accepts.
+    Argument = 1,
+    /// A file's content is not what its format promises.
+    Format = 2,
+    /// The operating system refused a file operation.
+    Io = 3,
+    /// The input is well formed, but no vehicle can be made of it.
+    Reconstruction = 4,
+    /// The progress callback asked to stop.
+    Cancelled = 5,
+    /// This build of the library was made without what was asked for.
+    NotBuilt = 6,
+    /// A bug in the library. The call had no effect; other handles are as they were.
+    Internal = 7,
+}
+
+/// Why a call failed. Owned by the caller, who frees it with `vg_error_free`; it never changes, and any thread may
+/// read it.
+pub struct vg_error {
+    _private: [u8; 0],
+}
+
+/// What a `vg_error` points to.
+pub(super) struct ErrorObject {
+    status: vg_status,
+    message: CString,
+}
+
+impl vg_error {
+    // The handle's name is where readers look for what is behind it.
+    #[allow(clippy::new_ret_no_self)]
+    pub(super) fn new(failure: Failure) -> ErrorObject {
+        let (status, message) = match failure {
+            Failure::Panicked(message) => (vg_status::Internal, message),
+            Failure::Refused(error) => (status_of(&error), error.to_string()),
+        };
+        ErrorObject { status, message: c_string(message) }
+    }
+}
+
+impl ErrorObject {
+    pub(super) fn status(&self) -> vg_status {
+        self.status
+    }
+
+    pub(super) fn into_raw(self) -> *mut vg_error {
+        Box::into_raw(Box::new(self)).cast()
+    }
+}
+
+/// The numbers C sees for the library's errors.
+pub(crate) fn status_of(error: &Error) -> vg_status {
+    match error {
+        Error::Argument { .. } => vg_status::Argument,
+        Error::Format { .. } => vg_status::Format,
+        Error::Io { .. } => vg_status::Io,
+        Error::Reconstruction { .. } => vg_status::Reconstruction,
+        Error::Cancelled { .. } => vg_status::Cancelled,
+        Error::NotBuilt { .. } => vg_status::NotBuilt,
+    }
+}
+
+/// Text for C; a NUL inside, which a message may quote, becomes U+FFFD.
+pub(super) fn c_string(text: String) -> CString {
+    CString::new(text).unwrap_or_else(|e| {
+        let text = String::from_utf8_lossy(&e.into_vec()).replace('\0', "\u{fffd}");
+        CString::new(text).unwrap_or_default()
+    })
+}
+
+unsafe fn object<'a>(error: *const vg_error) -> Option<&'a ErrorObject> {
+    unsafe { error.cast::<ErrorObject>().as_ref() }
+}
+
+/// The status of the call that made this error. NULL: `VG_STATUS_OK`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_error_code(error: *const vg_error) -> vg_status {
+    guarded_value(vg_status::Internal, || unsafe { object(error) }.map_or(vg_status::Ok, |e| e.status))
+}
+
+/// What went wrong in one line of UTF-8: the argument, what was found, what is allowed. Lives as long as the error.
+/// NULL: an empty string. Never NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_error_message(error: *const vg_error) -> *const c_char {
+    guarded_value(c"".as_ptr(), || unsafe { object(error) }.map_or(c"".as_ptr(), |e| e.message.as_ptr()))
+}
+
+/// Frees an error. NULL: nothing happens.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_error_free(error: *mut vg_error) {
+    guarded_value((), || {
+        if !error.is_null() {
+            drop(unsafe { Box::from_raw(error.cast::<ErrorObject>()) });
+        }
+    });
+}

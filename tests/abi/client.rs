@@ -1,0 +1,114 @@
+//! Programs of earlier releases, compiled against the header of their release, run with today's library.
+
+use crate::tools::{STRICT, cc, compile, cxx, have, library_folder, output, root, run, scratch, target};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn releases() -> Vec<PathBuf> {
+    let folder = root().join("tests/abi/releases");
+    let mut releases: Vec<PathBuf> =
+        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    releases.sort();
+    releases
+}
+
+fn sample() -> PathBuf {
+    root().join("tests/data/sedan")
+}
+
+fn run_client(program: &Path, folder: &Path) -> String {
+    run(Command::new(program).arg(sample()).arg(folder))
+}
+
+#[test]
+fn clients_of_every_release_still_run() {
+    if !have(&cc(), "gcc", "clients of earlier releases") {
+        return;
+    }
+    for release in releases() {
+        let folder = scratch();
+        library_folder(folder.path());
+        let source = release.join("client.c");
+        let program = compile(&cc(), &["-O1"], &release, &source, folder.path(), "client");
+        run_client(&program, folder.path());
+    }
+}
+
+/// The machine code that a compiler made of a client in the days of its release: it knows only what it was promised.
+#[test]
+fn objects_compiled_at_each_release_still_link_and_run() {
+    if !cfg!(all(target_arch = "x86_64", target_os = "linux")) || !have(&cc(), "gcc", "old objects") {
+        return;
+    }
+    for release in releases() {
+        let object = release.join("client-x86_64-linux.o");
+        if std::env::var_os("VG_BLESS").is_some() && !object.exists() {
+            let mut command = Command::new(cc());
+            command.args(["-O1", "-fPIE", "-c", "client.c", "-o", "client-x86_64-linux.o"]).current_dir(&release);
+            run(&mut command);
+        }
+        let folder = scratch();
+        library_folder(folder.path());
+        let program = compile(&cc(), &[], &release, &object, folder.path(), "client");
+        run_client(&program, folder.path());
+    }
+}
+
+#[test]
+fn the_header_of_the_latest_release_is_todays_or_todays_has_more() {
+    let today = crate::symbols::declared();
+    for release in releases() {
+        let header = std::fs::read_to_string(release.join("vg.h")).unwrap();
+        let source = std::fs::read_to_string(release.join("client.c")).unwrap();
+        for declaration in header.split("VG_API\n").skip(1) {
+            let name = declaration.split('(').next().unwrap().rsplit([' ', '*']).next().unwrap();
+            assert!(today.contains(name), "{name} of {} is gone", release.display());
+            assert!(source.contains(&format!("{name}(")), "{}: the client does not call {name}", release.display());
+        }
+    }
+}
+
+#[test]
+fn the_client_compiles_clean_as_c_and_as_cxx_and_prints_the_same_with_the_static_library() {
+    if !have(&cc(), "gcc", "today's client") || !have(&cxx(), "g++", "today's client") {
+        return;
+    }
+    let folder = scratch();
+    library_folder(folder.path());
+    let include = root().join("include");
+    let release = releases().pop().unwrap();
+    let source = release.join("client.c");
+    let mut flags = STRICT.to_vec();
+    flags.extend(["-std=gnu11", "-O1"]);
+    let as_c = run_client(&compile(&cc(), &flags, &include, &source, folder.path(), "as_c"), folder.path());
+
+    let copy = folder.path().join("client.cpp");
+    std::fs::copy(&source, &copy).unwrap();
+    let mut flags = STRICT.to_vec();
+    flags.extend(["-std=c++17", "-O1"]);
+    let as_cxx = run_client(&compile(&cxx(), &flags, &include, &copy, folder.path(), "as_cxx"), folder.path());
+    assert_eq!(as_c, as_cxx);
+
+    let static_program = folder.path().join("static");
+    let mut command = Command::new(cc());
+    command.arg("-I").arg(&include).arg(&source).arg(target().join("libvg.a")).arg("-o").arg(&static_program);
+    run(command.args(["-lm", "-lpthread", "-ldl"]));
+    assert_eq!(as_c, run_client(&static_program, folder.path()));
+}
+
+#[test]
+fn valgrind_finds_no_error_and_no_leak_in_the_client() {
+    if !have("valgrind", "valgrind", "memory errors and leaks") || !have(&cc(), "gcc", "memory errors") {
+        return;
+    }
+    let folder = scratch();
+    library_folder(folder.path());
+    let source = releases().pop().unwrap().join("client.c");
+    let program = compile(&cc(), &["-g"], &root().join("include"), &source, folder.path(), "client");
+    let mut command = Command::new("valgrind");
+    command.args(["--error-exitcode=99", "--leak-check=full", "--show-leak-kinds=definite,indirect,possible"]);
+    command.args(["--errors-for-leak-kinds=definite,indirect", "--track-origins=no", "-q"]);
+    let result = output(command.arg(&program).arg(sample()).arg(folder.path()).arg("quick"));
+    let errors = String::from_utf8_lossy(&result.stderr);
+    assert!(result.status.success() && errors.is_empty(), "{}\n{errors}", result.status);
+}

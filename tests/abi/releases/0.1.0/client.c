@@ -1,0 +1,415 @@
+/*
+ * A program written for release 0.1.0. It calls every function of that release and checks what it gets, with
+ * nothing but the C library and threads. It is compiled against the header of its release, kept beside it, and
+ * must link and run with every later library of the same ABI number. It is also today's C test: compiled as C and
+ * as C++, linked against the shared and the static library, and run under Valgrind.
+ *
+ *     client SAMPLE_FOLDER SCRATCH_FOLDER [quick]
+ *
+ * Prints one line per buffer, "name count hash", which other bindings must print too.
+ */
+#include <math.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "vg.h"
+
+#define CHECK(condition)                                                        \
+    do {                                                                        \
+        if (!(condition)) {                                                     \
+            fprintf(stderr, "%s:%d: not true: %s\n", __FILE__, __LINE__, #condition); \
+            exit(1);                                                            \
+        }                                                                       \
+    } while (0)
+
+/* A call that must succeed; `error` is in scope. */
+#define DO(call)                                                                             \
+    do {                                                                                     \
+        vg_status done_ = (call);                                                            \
+        if (done_ != VG_STATUS_OK || error != NULL) {                                        \
+            fprintf(stderr, "%s:%d: %s: %s\n", __FILE__, __LINE__, #call, vg_error_message(error)); \
+            exit(1);                                                                         \
+        }                                                                                    \
+    } while (0)
+
+/* A call that must fail with this status and these words in its message. */
+#define FAILS(call, status, words)                                                           \
+    do {                                                                                     \
+        CHECK((call) == (status));                                                           \
+        CHECK(error != NULL && vg_error_code(error) == (status));                            \
+        if (strstr(vg_error_message(error), words) == NULL) {                                \
+            fprintf(stderr, "%s:%d: no \"%s\" in: %s\n", __FILE__, __LINE__, words, vg_error_message(error)); \
+            exit(1);                                                                         \
+        }                                                                                    \
+        vg_error_free(error);                                                                \
+        error = NULL;                                                                        \
+    } while (0)
+
+static const char *sample;
+static const char *scratch;
+static int quick;
+
+static uint64_t hash_of(const void *data, size_t bytes) {
+    const unsigned char *p = (const unsigned char *)data;
+    uint64_t hash = 14695981039346656037u; /* FNV-1a */
+    size_t i;
+    for (i = 0; i < bytes; i++) {
+        hash = (hash ^ p[i]) * 1099511628211u;
+    }
+    return hash;
+}
+
+static void print_hash(const char *name, const void *data, size_t bytes) {
+    printf("%s %lu %016llx\n", name, (unsigned long)bytes, (unsigned long long)hash_of(data, bytes));
+}
+
+static int near_to(double a, double b, double tolerance) {
+    return fabs(a - b) <= tolerance;
+}
+
+static void path_in(const char *folder, const char *name, char *out, size_t size) {
+    int n = snprintf(out, size, "%s/%s", folder, name);
+    CHECK(n > 0 && (size_t)n < size);
+}
+
+/* Callbacks record what they are told. */
+typedef struct told {
+    int calls;
+    int stop_after;
+    double last_fraction;
+    char last_stage[32];
+    int lines;
+} told;
+
+static int32_t on_progress(const char *stage, double fraction, void *user) {
+    told *t = (told *)user;
+    t->calls++;
+    t->last_fraction = fraction;
+    snprintf(t->last_stage, sizeof t->last_stage, "%s", stage);
+    return t->stop_after > 0 && t->calls >= t->stop_after;
+}
+
+static void on_log(int32_t level, const char *message, void *user) {
+    told *t = (told *)user;
+    CHECK(level >= VG_LOG_LEVEL_WARNING && level <= VG_LOG_LEVEL_DEBUG && message[0] != '\0');
+    t->lines++;
+}
+
+static void versions(void) {
+    char expected[32];
+    int major, minor, patch;
+    snprintf(expected, sizeof expected, "%d.", VG_VERSION_MAJOR);
+    CHECK(strncmp(vg_version(), expected, strlen(expected)) == 0);
+    CHECK(sscanf(vg_version(), "%d.%d.%d", &major, &minor, &patch) == 3);
+    CHECK(minor > VG_VERSION_MINOR || (minor == VG_VERSION_MINOR && patch >= VG_VERSION_PATCH));
+    CHECK(vg_abi_version() == VG_ABI_VERSION);
+    CHECK(vg_error_code(NULL) == VG_STATUS_OK);
+    CHECK(strcmp(vg_error_message(NULL), "") == 0);
+}
+
+static void poses_and_cameras(void) {
+    /* COLMAP's world turned by 90 degrees about z and moved; half the size of the vehicle's. */
+    const double vehicle_from_world[16] = {0, -2, 0, 1, 2, 0, 0, 0, 0, 0, 2, 0.5, 0, 0, 0, 1};
+    const double qvec[4] = {2, 0, 0, 0}, tvec[3] = {1, 2, 3};
+    const double opengl[12] = {1, 0, 0, 4, 0, 1, 0, 5, 0, 0, 1, 6};
+    const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    const double vehicle_in_ego[12] = {0, -1, 0, 500000, 1, 0, 0, 5400000, 0, 0, 1, 100};
+    const double camera_in_ego[12] = {1, 0, 0, 500002, 0, 1, 0, 5400001, 0, 0, 1, 101};
+    const double params[4] = {100, 110, 31.5, 24};
+    const double k[9] = {100, 0, 31, 0, 110, 23.5, 0, 0, 1}, brown[5] = {0.1, 0.01, 0.001, 0.002, 0.003};
+    const double point[3] = {0.5, -0.25, 2};
+    double pose[12], pixel[2];
+    vg_camera camera, other;
+    vg_error *error = NULL;
+
+    DO(vg_pose_from_colmap(qvec, tvec, NULL, pose, &error));
+    CHECK(near_to(pose[0], 1, 1e-15) && near_to(pose[3], -1, 1e-15) && near_to(pose[11], -3, 1e-15));
+    DO(vg_pose_from_colmap(qvec, tvec, vehicle_from_world, pose, &error));
+    /* The centre (-1, -2, -3) goes to (4 + 1, -2, -6 + 0.5). */
+    CHECK(near_to(pose[3], 5, 1e-14) && near_to(pose[7], -2, 1e-14) && near_to(pose[11], -5.5, 1e-14));
+    CHECK(near_to(pose[1], -1, 1e-14) && near_to(pose[4], 1, 1e-14));
+
+    DO(vg_pose_from_opengl(opengl, NULL, pose, &error));
+    CHECK(pose[0] == 1 && pose[5] == -1 && pose[10] == -1 && pose[3] == 4 && pose[7] == 5 && pose[11] == 6);
+
+    DO(vg_pose_from_box(vehicle_in_ego, camera_in_ego, pose, &error));
+    CHECK(near_to(pose[3], 1, 1e-8) && near_to(pose[7], -2, 1e-8) && near_to(pose[11], 1, 1e-8));
+    CHECK(near_to(pose[1], 1, 1e-15) && near_to(pose[4], -1, 1e-15));
+
+    CHECK(vg_camera_init(&camera, sizeof camera) == VG_STATUS_OK);
+    CHECK(camera.struct_size == sizeof camera && camera.model == VG_CAMERA_MODEL_PINHOLE);
+    CHECK(memcmp(camera.vehicle_from_camera, identity, sizeof identity) == 0);
+    DO(vg_camera_from_colmap_model(VG_CAMERA_MODEL_PINHOLE, params, 4, 63, 48, NULL, &camera, &error));
+    CHECK(camera.width == 63 && camera.height == 48 && memcmp(camera.params, params, sizeof params) == 0);
+    FAILS(vg_camera_from_colmap_model(9, params, 4, 63, 48, NULL, &camera, &error), VG_STATUS_ARGUMENT, "model");
+
+    DO(vg_camera_from_opencv(k, NULL, 0, 0, 63, 48, NULL, &other, &error));
+    CHECK(other.model == VG_CAMERA_MODEL_PINHOLE && memcmp(other.params, params, sizeof params) == 0);
+    DO(vg_camera_from_opencv(k, brown, 5, 0, 63, 48, NULL, &other, &error));
+    CHECK(other.model == VG_CAMERA_MODEL_FULL_OPENCV && other.params[8] == 0.003);
+
+    DO(vg_camera_project(&camera, point, pixel, &error));
+    CHECK(near_to(pixel[0], 100 * 0.25 + 31.5, 1e-12) && near_to(pixel[1], 110 * -0.125 + 24, 1e-12));
+    DO(vg_camera_scale(&camera, 126, 96, &other, &error));
+    CHECK(other.params[0] == 200 && other.params[2] == 63 && other.width == 126);
+    DO(vg_camera_crop(&camera, 10, 8, 20, 16, &other, &error));
+    CHECK(other.params[2] == 21.5 && other.params[3] == 16 && other.width == 20 && other.height == 16);
+    FAILS(vg_camera_crop(&camera, 60, 0, 20, 16, &other, &error), VG_STATUS_ARGUMENT, "allowed");
+}
+
+static vg_scene *open_sample(vg_context *context, told *heard) {
+    static const char *const names[4] = {"000", "001", "002", "003"};
+    vg_scene_options options;
+    vg_scene *scene = NULL;
+    vg_error *error = NULL;
+    CHECK(vg_scene_options_init(&options, sizeof options) == VG_STATUS_OK);
+    options.context = context;
+    options.names = names;
+    options.name_count = 4;
+    options.log = on_log;
+    options.log_user = heard;
+    DO(vg_transforms_open(sample, &options, &scene, &error));
+    CHECK(vg_scene_view_count(scene) == 4);
+    return scene;
+}
+
+static void colmap_without_a_folder(void) {
+    vg_scene_options options;
+    vg_scene *scene = NULL;
+    vg_error *error = NULL;
+    CHECK(vg_scene_options_init(&options, sizeof options) == VG_STATUS_OK);
+    FAILS(vg_colmap_open("/nowhere/at/all", &options, &scene, &error), VG_STATUS_IO, "/nowhere/at/all");
+    CHECK(scene == NULL);
+    FAILS(vg_colmap_open(sample, &options, &scene, &error), VG_STATUS_FORMAT, "COLMAP");
+    vg_scene_free(NULL);
+}
+
+static vg_gaussians *reconstruct(vg_context *context, const vg_view *views, size_t count) {
+    vg_options options;
+    vg_report_figures figures;
+    vg_gaussians *car = NULL, *again = NULL;
+    vg_report *report = NULL;
+    vg_error *error = NULL;
+    told heard = {0, 0, 0, "", 0};
+    size_t points;
+
+    CHECK(vg_options_init(&options, sizeof options) == VG_STATUS_OK);
+    options.context = context;
+    options.points = 1;
+    options.check = !quick;
+    options.progress = on_progress;
+    options.progress_user = &heard;
+    options.log = on_log;
+    options.log_user = &heard;
+    DO(vg_reconstruct(views, count, &options, &car, &report, &error));
+    CHECK(heard.calls >= 6 && heard.last_fraction >= 0 && heard.last_fraction <= 1 && heard.lines > 6);
+    CHECK(vg_gaussians_count(car) > 10000 && vg_gaussians_sh_degree(car) == 2);
+
+    CHECK(vg_report_figures_init(&figures, sizeof figures) == VG_STATUS_OK);
+    DO(vg_report_get_figures(report, &figures, &error));
+    CHECK(figures.gaussian_count == vg_gaussians_count(car) && figures.views_used == 4);
+    CHECK(figures.prior == VG_PRIOR_GIVEN && figures.sh_degree == 2 && figures.total_ms > 0);
+    CHECK(figures.threads == vg_context_threads(context) && figures.has_input_error == !quick);
+    CHECK(quick || (figures.input_psnr_db > 20 && figures.input_silhouette_iou > 0.9));
+    CHECK(figures.extent_high[0] - figures.extent_low[0] > 3.5 && figures.extent_high[0] - figures.extent_low[0] < 6);
+    CHECK(strstr(vg_report_json(report), "\"left_out\"") != NULL);
+    points = vg_report_point_count(report);
+    CHECK(points > 1000 && isfinite(vg_report_point_positions(report)[3 * points - 1]));
+    CHECK(vg_report_point_colors(report) != NULL);
+    vg_report_free(report);
+
+    heard.calls = 0;
+    heard.stop_after = 3;
+    report = (vg_report *)&heard;
+    FAILS(vg_reconstruct(views, count, &options, &again, &report, &error), VG_STATUS_CANCELLED, heard.last_stage);
+    CHECK(again == NULL && report == NULL);
+    options.prior = VG_PRIOR_ONNX;
+    CHECK(vg_reconstruct(views, count, &options, &again, NULL, NULL) != VG_STATUS_OK);
+    return car;
+}
+
+/* Everything that makes new Gaussians of old ones. */
+static void derive(const vg_gaussians *car) {
+    const double turned[16] = {0, -1, 0, 10, 1, 0, 0, 20, 0, 0, 1, 0.5, 0, 0, 0, 1};
+    const size_t n = vg_gaussians_count(car);
+    const size_t sh = (size_t)(vg_gaussians_sh_degree(car) + 1) * (size_t)(vg_gaussians_sh_degree(car) + 1) * 3;
+    const float *p = vg_gaussians_positions(car), *q;
+    vg_gaussian_arrays arrays;
+    vg_gaussians *moved = NULL, *mirrored = NULL, *twice = NULL, *both = NULL, *copy = NULL, *loaded = NULL;
+    vg_error *error = NULL;
+    char path[1024];
+
+    DO(vg_gaussians_transform(car, turned, &moved, &error));
+    q = vg_gaussians_positions(moved);
+    CHECK(near_to(q[0], 10 - p[1], 2e-6) && near_to(q[1], 20 + p[0], 4e-6) && near_to(q[2], p[2] + 0.5, 1e-6));
+    DO(vg_gaussians_mirror(car, &mirrored, &error));
+    CHECK(vg_gaussians_positions(mirrored)[1] == -p[1]);
+    DO(vg_gaussians_mirror(mirrored, &twice, &error));
+    CHECK(memcmp(vg_gaussians_sh(twice), vg_gaussians_sh(car), n * sh * sizeof(float)) == 0);
+    DO(vg_gaussians_merge(car, moved, &both, &error));
+    CHECK(vg_gaussians_count(both) == 2 * n);
+    CHECK(memcmp(vg_gaussians_positions(both) + 3 * n, q, n * 3 * sizeof(float)) == 0);
+
+    CHECK(vg_gaussian_arrays_init(&arrays, sizeof arrays) == VG_STATUS_OK);
+    arrays.count = n;
+    arrays.sh_degree = vg_gaussians_sh_degree(car);
+    arrays.positions = p;
+    arrays.scales = vg_gaussians_scales(car);
+    arrays.rotations = vg_gaussians_rotations(car);
+    arrays.opacities = vg_gaussians_opacities(car);
+    arrays.sh = vg_gaussians_sh(car);
+    DO(vg_gaussians_from_arrays(&arrays, &copy, &error));
+    CHECK(memcmp(vg_gaussians_scales(copy), arrays.scales, n * 3 * sizeof(float)) == 0);
+    CHECK(memcmp(vg_gaussians_opacities(copy), arrays.opacities, n * sizeof(float)) == 0);
+    arrays.sh_degree = 4;
+    FAILS(vg_gaussians_from_arrays(&arrays, &loaded, &error), VG_STATUS_ARGUMENT, "sh_degree");
+
+    path_in(scratch, "client.ply", path, sizeof path);
+    DO(vg_gaussians_save_ply(car, path, &error));
+    DO(vg_gaussians_load_ply(path, &loaded, &error));
+    CHECK(vg_gaussians_count(loaded) == n);
+    CHECK(memcmp(vg_gaussians_positions(loaded), p, n * 3 * sizeof(float)) == 0);
+    path_in(scratch, "no/such/folder.ply", path, sizeof path);
+    FAILS(vg_gaussians_save_ply(car, path, &error), VG_STATUS_IO, "folder.ply");
+
+    vg_gaussians_free(moved);
+    vg_gaussians_free(mirrored);
+    vg_gaussians_free(twice);
+    vg_gaussians_free(both);
+    vg_gaussians_free(copy);
+    vg_gaussians_free(loaded);
+    vg_gaussians_free(NULL);
+}
+
+enum { WIDTH = 160, HEIGHT = 120, CALLERS = 8 };
+
+typedef struct job {
+    const vg_gaussians *car;
+    const vg_camera *camera;
+    vg_context *context;
+    unsigned char *pixels;
+} job;
+
+static void *draw(void *user) {
+    job *j = (job *)user;
+    vg_render_options options;
+    vg_image_target target;
+    vg_error *error = NULL;
+    CHECK(vg_render_options_init(&options, sizeof options) == VG_STATUS_OK);
+    CHECK(vg_image_target_init(&target, sizeof target) == VG_STATUS_OK);
+    options.context = j->context;
+    target.width = WIDTH;
+    target.height = HEIGHT;
+    target.color = j->pixels;
+    DO(vg_render(j->car, j->camera, &options, &target, &error));
+    return NULL;
+}
+
+static void render(const vg_gaussians *car, const vg_camera *photograph, vg_context *context) {
+    static unsigned char pictures[CALLERS][HEIGHT * WIDTH * 4], padded[HEIGHT][WIDTH * 4 + 20];
+    static float colors[HEIGHT * WIDTH * 4], depth[HEIGHT * WIDTH];
+    vg_camera camera;
+    vg_render_options options;
+    vg_image_target target;
+    vg_error *error = NULL;
+    pthread_t threads[CALLERS];
+    job jobs[CALLERS];
+    int i, covered = 0;
+
+    DO(vg_camera_scale(photograph, WIDTH, HEIGHT, &camera, &error));
+    for (i = 0; i < CALLERS; i++) {
+        jobs[i].car = car;
+        jobs[i].camera = &camera;
+        jobs[i].context = context;
+        jobs[i].pixels = pictures[i];
+        CHECK(pthread_create(&threads[i], NULL, draw, &jobs[i]) == 0);
+    }
+    for (i = 0; i < CALLERS; i++) {
+        CHECK(pthread_join(threads[i], NULL) == 0);
+        CHECK(memcmp(pictures[0], pictures[i], sizeof pictures[0]) == 0);
+    }
+    print_hash("render_rgba8", pictures[0], sizeof pictures[0]);
+
+    CHECK(vg_render_options_init(&options, sizeof options) == VG_STATUS_OK);
+    CHECK(vg_image_target_init(&target, sizeof target) == VG_STATUS_OK);
+    options.context = context;
+    options.background = VG_BACKGROUND_TRANSPARENT;
+    target.width = WIDTH;
+    target.height = HEIGHT;
+    target.color = padded;
+    target.color_row_stride = sizeof padded[0];
+    target.depth = depth;
+    memset(padded, 77, sizeof padded);
+    DO(vg_render(car, &camera, &options, &target, &error));
+    target.color = colors;
+    target.color_row_stride = 0;
+    target.color_format = VG_FORMAT_RGBA32F;
+    options.alpha = VG_ALPHA_PREMULTIPLIED;
+    DO(vg_render(car, &camera, &options, &target, &error));
+    for (i = 0; i < HEIGHT * WIDTH; i++) {
+        int row = i / WIDTH, column = i % WIDTH;
+        float alpha = colors[4 * i + 3];
+        CHECK(alpha >= 0 && alpha <= 1 && (alpha > 0) == (depth[i] > 0));
+        CHECK(abs((int)padded[row][4 * column + 3] - (int)lrintf(255 * alpha)) <= 1);
+        CHECK(padded[row][WIDTH * 4 + column % 20] == 77);
+        covered += alpha > 0.5f;
+    }
+    CHECK(covered > WIDTH * HEIGHT / 20 && covered < WIDTH * HEIGHT);
+
+    target.color_format = VG_FORMAT_RGB8;
+    FAILS(vg_render(car, &camera, &options, &target, &error), VG_STATUS_ARGUMENT, "color_format");
+    options.backend = VG_BACKEND_GPU;
+    CHECK(vg_render(car, &camera, &options, &target, NULL) != VG_STATUS_OK);
+}
+
+int main(int argc, char **argv) {
+    vg_context_options settings;
+    vg_context *context = NULL;
+    vg_scene *scene;
+    vg_view views[4];
+    vg_gaussians *car;
+    vg_error *error = NULL;
+    told heard = {0, 0, 0, "", 0};
+    size_t i, n;
+
+    CHECK(argc >= 3);
+    sample = argv[1];
+    scratch = argv[2];
+    quick = argc > 3;
+
+    versions();
+    poses_and_cameras();
+    CHECK(vg_context_options_init(&settings, sizeof settings) == VG_STATUS_OK);
+    settings.threads = 2;
+    DO(vg_context_new(&settings, &context, &error));
+    CHECK(vg_context_threads(context) == 2);
+
+    colmap_without_a_folder();
+    scene = open_sample(context, &heard);
+    for (i = 0; i < 4; i++) {
+        CHECK(vg_view_init(&views[i], sizeof views[i]) == VG_STATUS_OK);
+        DO(vg_scene_get_view(scene, i, &views[i], &error));
+        CHECK(views[i].image.data != NULL && views[i].mask.data != NULL && views[i].depth.data != NULL);
+    }
+    FAILS(vg_scene_get_view(scene, 4, &views[0], &error), VG_STATUS_ARGUMENT, "index");
+
+    car = reconstruct(context, views, 4);
+    n = vg_gaussians_count(car);
+    print_hash("positions", vg_gaussians_positions(car), n * 3 * sizeof(float));
+    print_hash("scales", vg_gaussians_scales(car), n * 3 * sizeof(float));
+    print_hash("rotations", vg_gaussians_rotations(car), n * 4 * sizeof(float));
+    print_hash("opacities", vg_gaussians_opacities(car), n * sizeof(float));
+    print_hash("sh", vg_gaussians_sh(car), n * 27 * sizeof(float));
+    derive(car);
+    render(car, &views[0].camera, context);
+
+    vg_scene_free(scene);
+    vg_gaussians_free(car);
+    vg_report_free(NULL);
+    vg_context_free(context);
+    vg_context_free(NULL);
+    vg_error_free(NULL);
+    return 0;
+}
