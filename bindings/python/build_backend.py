@@ -28,8 +28,7 @@ def prepare() -> None:
     check_checkout()
     library = build_library()
     fill(PACKAGE / "lib", [library])
-    headers = sorted((ROOT / "include").glob("*.h")) if (ROOT / "include").is_dir() else []
-    fill(PACKAGE / "include", headers)
+    fill(PACKAGE / "include", [ROOT / "include" / "vg.h"])
 
 
 def check_checkout() -> None:

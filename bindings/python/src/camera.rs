@@ -6,7 +6,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 use vg::Pose;
-use vg::geometry::{CameraModel, Distortion, Intrinsics, Similarity, frame};
+use vg::geometry::{CameraModel, Distortion, Intrinsics, OpenCvModel, Similarity, frame};
 
 /// A posed camera. It does not change: methods return new ones.
 #[pyclass(module = "vehicle_gaussians", frozen, eq)]
@@ -41,13 +41,12 @@ impl Camera {
             .map_err(|e| from_library(py, e))
     }
 
-    /// From a 3x3 matrix K of focal lengths and principal point in pixels.
+    /// From a 3x3 matrix K of focal lengths and principal point in pixels, without skew.
     ///
-    /// The centre of the top-left pixel is (0.5, 0.5), as in COLMAP. OpenCV's calibration puts it at (0, 0): pass
-    /// pixel_center=0 for its K. distortion is OpenCV's: k1, k2, p1, p2[, k3[, k4, k5, k6]]; for a fisheye lens use
-    /// from_colmap("OPENCV_FISHEYE", ...).
+    /// The centre of the top-left pixel is (0.5, 0.5), as in COLMAP: a principal point in the middle is width / 2. For
+    /// the K of OpenCV's calibration use from_opencv. distortion is k1, k2, p1, p2[, k3[, k4, k5, k6]].
     #[staticmethod]
-    #[pyo3(signature = (K, vehicle_from_camera, width, height, distortion=None, *, pixel_center=0.5))]
+    #[pyo3(signature = (K, vehicle_from_camera, width, height, distortion=None))]
     #[expect(non_snake_case)]
     fn from_matrix(
         K: &Bound<'_, PyAny>,
@@ -55,32 +54,52 @@ impl Camera {
         width: u32,
         height: u32,
         distortion: Option<&Bound<'_, PyAny>>,
-        pixel_center: f64,
     ) -> PyResult<Self> {
-        let py = K.py();
-        let [fx, skew, cx, below, fy, cy, bottom @ ..] = matrix3(K, "K")?;
-        if skew != 0.0 || below != 0.0 || bottom != [0.0, 0.0, 1.0] {
-            let found = format!("skew {skew}, {below} below the diagonal, last row {bottom:?}");
-            return Err(bad_value(py, "K", &found, "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]"));
-        }
-        let shift = 0.5 - pixel_center;
-        let inner = vg::Camera {
-            width,
-            height,
-            intrinsics: Intrinsics { fx, fy, cx: cx + shift, cy: cy + shift },
-            distortion: distortion.map_or(Ok(Distortion::None), opencv_distortion)?,
-            vehicle_from_camera: pose(vehicle_from_camera, "vehicle_from_camera")?,
+        let k = matrix3(K, "K")?;
+        let mut camera = Self::from_opencv(K, vehicle_from_camera, width, height, distortion, false)?;
+        (camera.inner.intrinsics.cx, camera.inner.intrinsics.cy) = (k[2], k[5]);
+        Ok(camera)
+    }
+
+    /// From OpenCV's calibration, which puts the centre of the top-left pixel at (0, 0): half a pixel is added to the
+    /// principal point.
+    ///
+    /// distortion is that of cv2.calibrateCamera or, with fisheye=True, of cv2.fisheye.
+    #[staticmethod]
+    #[pyo3(signature = (K, vehicle_from_camera, width, height, distortion=None, *, fisheye=false))]
+    #[expect(non_snake_case)]
+    fn from_opencv(
+        K: &Bound<'_, PyAny>,
+        vehicle_from_camera: &Bound<'_, PyAny>,
+        width: u32,
+        height: u32,
+        distortion: Option<&Bound<'_, PyAny>>,
+        fisheye: bool,
+    ) -> PyResult<Self> {
+        let model = if fisheye { OpenCvModel::Fisheye } else { OpenCvModel::Standard };
+        let distortion = match distortion {
+            None => Vec::new(),
+            // OpenCV hands out (1, n) and (n, 1) too.
+            Some(object) => numbers(object, "distortion", "a list of numbers")?.1,
         };
-        inner.validate("camera").map_err(|e| from_library(py, e))?;
-        Ok(Self { inner })
+        let pose = pose(vehicle_from_camera, "vehicle_from_camera")?;
+        vg::Camera::from_opencv("camera", &matrix3(K, "K")?, &distortion, model, width, height, pose)
+            .map(|inner| Self { inner })
+            .map_err(|e| from_library(K.py(), e))
     }
 
     /// The same camera for pictures resized to width x height.
     #[pyo3(signature = (width, height))]
     fn scaled(&self, py: Python<'_>, width: u32, height: u32) -> PyResult<Self> {
-        let inner = self.inner.scaled_to(width, height);
-        inner.validate("camera").map_err(|e| from_library(py, e))?;
-        Ok(Self { inner })
+        let resized = self.inner.resized(width, height).map_err(|e| from_library(py, e))?;
+        Ok(Self { inner: resized })
+    }
+
+    /// The camera of the part image[y : y + height, x : x + width] of its pictures.
+    #[pyo3(signature = (x, y, width, height))]
+    fn cropped(&self, py: Python<'_>, x: u32, y: u32, width: u32, height: u32) -> PyResult<Self> {
+        let part = self.inner.cropped(x, y, width, height).map_err(|e| from_library(py, e))?;
+        Ok(Self { inner: part })
     }
 
     /// The same camera, lens included, in another place.
@@ -178,20 +197,6 @@ fn camera_model(model: &Bound<'_, PyAny>) -> PyResult<CameraModel> {
     })
 }
 
-/// OpenCV's distCoeffs.
-fn opencv_distortion(object: &Bound<'_, PyAny>) -> PyResult<Distortion> {
-    let allowed = "OpenCV's k1, k2, p1, p2[, k3[, k4, k5, k6]]";
-    let (shape, values) = numbers(object, "distortion", allowed)?;
-    let mut c = [0.0; 8];
-    match values.len() {
-        0 => return Ok(Distortion::None),
-        n @ (4 | 5 | 8) => c[..n].copy_from_slice(&values),
-        _ => return Err(bad_value(object.py(), "distortion", &shape_text(&shape), allowed)),
-    }
-    let [k1, k2, p1, p2, k3, k4, k5, k6] = c;
-    Ok(Distortion::Brown { k: [k1, k2, k3, k4, k5, k6], p: [p1, p2] })
-}
-
 /// vehicle_from_camera (4x4) of COLMAP's world-to-camera quaternion (w, x, y, z) and translation.
 ///
 /// vehicle_from_world is the similarity (4x4) from the model's world to the vehicle's frame; without, they are one.
@@ -221,6 +226,20 @@ pub(crate) fn pose_from_opengl<'py>(
     let rows = pose_rows(camera_to_world, "camera_to_world")?;
     let pose = frame::pose_from_opengl("camera_to_world", &rows);
     in_vehicle_frame(camera_to_world.py(), pose, vehicle_from_world)
+}
+
+/// vehicle_from_camera (4x4) of a vehicle that was tracked as a box: the poses (3x4 or 4x4, metres) of the box and of
+/// the camera in one frame (ego, map, UTM) at the moment of the picture. The box's axes are x forward, y left, z up, and
+/// its origin lies on the vehicle's plane of symmetry.
+#[pyfunction]
+#[pyo3(signature = (ego_from_vehicle, ego_from_camera))]
+pub(crate) fn pose_from_box<'py>(
+    ego_from_vehicle: &Bound<'py, PyAny>,
+    ego_from_camera: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (vehicle, camera) =
+        (pose(ego_from_vehicle, "ego_from_vehicle")?, pose(ego_from_camera, "ego_from_camera")?);
+    Ok(matrix4(ego_from_vehicle.py(), &frame::pose_from_box(&vehicle, &camera).to_row_major()))
 }
 
 fn in_vehicle_frame<'py>(

@@ -5,10 +5,9 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
 use std::any::Any;
-use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError};
-use vg::progress::Context;
+use vg::progress::Threads;
 
 /// Numbers of `vehicle_gaussians.Status`, which are the C library's.
 #[derive(Clone, Copy)]
@@ -19,6 +18,7 @@ pub(crate) enum Status {
     Io = 3,
     Reconstruction = 4,
     Cancelled = 5,
+    NotBuilt = 6,
     Internal = 7,
 }
 
@@ -51,6 +51,7 @@ pub(crate) fn from_library(py: Python<'_>, error: vg::Error) -> PyErr {
         vg::Error::Format { .. } => Status::Format,
         vg::Error::Io { .. } => Status::Io,
         vg::Error::Reconstruction { .. } => Status::Reconstruction,
+        vg::Error::NotBuilt { .. } => Status::NotBuilt,
         vg::Error::Cancelled { .. } => Status::Cancelled,
         _ => Status::Internal,
     };
@@ -79,10 +80,7 @@ pub(crate) fn pooled<T: Send>(
     threads: usize,
     work: impl FnOnce() -> vg::Result<T> + Send,
 ) -> PyResult<T> {
-    detached(py, || {
-        let mut silent = |_| ControlFlow::Continue(());
-        Context::new(threads, &mut silent)?.parallel(work)
-    })
+    detached(py, || Threads::new(threads)?.run(work))
 }
 
 /// Keeps panics off standard error: they are caught, and their text travels in the exception.

@@ -1,6 +1,6 @@
 //! `Gaussians`: read-only arrays over the library's memory, pictures, and PLY files.
 
-use crate::arrays::{array, borrowed, owned, shape_text, values, vector};
+use crate::arrays::{array, borrowed, owned, shape_text, similarity, values, vector};
 use crate::camera::Camera;
 use crate::errors::{bad_type, bad_value, from_library, pooled};
 use numpy::ndarray::ArrayView;
@@ -82,6 +82,22 @@ impl Gaussians {
     #[pyo3(signature = ())]
     fn mirrored(&self, py: Python<'_>) -> PyResult<Self> {
         pooled(py, 1, || Ok(self.inner.mirrored())).map(|inner| Self { inner })
+    }
+
+    /// These in another frame: to_from_vehicle is a 4x4 similarity. Colours turn with the vehicle. Coordinates must stay
+    /// below 16384 m, where a float32 still holds a millimetre.
+    #[pyo3(signature = (to_from_vehicle))]
+    fn transformed(&self, to_from_vehicle: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let similarity = similarity(to_from_vehicle, "to_from_vehicle")?;
+        let inner = pooled(to_from_vehicle.py(), 0, || self.inner.transformed(&similarity))?;
+        Ok(Self { inner })
+    }
+
+    /// These, then those of other, at the higher of their degrees of spherical harmonics.
+    #[pyo3(signature = (other))]
+    fn merged(&self, py: Python<'_>, other: &Bound<'_, Self>) -> PyResult<Self> {
+        let other = &other.get().inner;
+        pooled(py, 1, || Ok(self.inner.merged(other))).map(|inner| Self { inner })
     }
 
     /// The picture a camera takes: uint8 (height, width, 3), or (height, width, 4) with straight alpha on a

@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use crate::camera::{Camera, pose_from_colmap, pose_from_opengl, similarity_from_points};
+    use crate::camera::{Camera, pose_from_box, pose_from_colmap, pose_from_opengl, similarity_from_points};
     #[pymodule_export]
     use crate::errors::panic_on_a_worker_thread;
     #[pymodule_export]

@@ -37,7 +37,7 @@ pub(crate) fn open_scene<'py>(
             Err(_) => similarity(object, ARGUMENT)?,
         }),
     };
-    let options = SceneOptions { views, vehicle_from_world, depth_scale, load_depth };
+    let options = SceneOptions { views, vehicle_from_world, depth_scale, load_depth, format: None };
     let files = pooled(py, 0, || io::open_scene(&path, &options))?;
     for note in &files.notes {
         warn(py, note)?;

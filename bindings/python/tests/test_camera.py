@@ -48,10 +48,21 @@ def test_a_pose_is_3x4_or_4x4_and_comes_back_as_4x4() -> None:
     assert "PINHOLE, 640x480" in repr(camera)
 
 
-def test_a_pixel_centre_at_the_origin_moves_the_principal_point_by_half_a_pixel() -> None:
-    K = np.array([[600.0, 0, 319.5], [0, 600, 239.5], [0, 0, 1]])
-    camera = vg.Camera.from_matrix(K, POSE, 640, 480, pixel_center=0)
+def test_opencvs_principal_point_moves_by_half_a_pixel() -> None:
+    K = np.array([[600.0, 0, 319.5], [0, 610, 239.5], [0, 0, 1]])
+    camera = vg.Camera.from_opencv(K, POSE, 640, 480)
     np.testing.assert_array_equal(camera.K[:2, 2], [320, 240])
+    assert camera == vg.Camera.from_matrix(camera.K, POSE, 640, 480)
+    # As cv2.calibrateCamera hands them out.
+    bent = vg.Camera.from_opencv(K, POSE, 640, 480, np.array([[0.1, 0.2, 0.3, 0.4, 0.5]]))
+    np.testing.assert_array_equal(bent.params, [600, 610, 320, 240, 0.1, 0.2, 0.3, 0.4, 0.5, 0, 0, 0])
+    fisheye = vg.Camera.from_opencv(K, POSE, 640, 480, [[0.1], [0.2], [0.3], [0.4]], fisheye=True)
+    assert fisheye == vg.Camera.from_colmap("OPENCV_FISHEYE", 640, 480, fisheye.params, POSE)
+
+
+def test_a_matrix_keeps_its_principal_point_to_the_last_bit() -> None:
+    K = np.array([[600.0, 0, 0.1], [0, 600, 1 / 3], [0, 0, 1]])
+    np.testing.assert_array_equal(vg.Camera.from_matrix(K, POSE, 640, 480).K, K)
 
 
 def test_a_point_is_drawn_at_its_pixel() -> None:
@@ -85,6 +96,21 @@ def test_scaling_scales_the_intrinsics_and_keeps_the_lens() -> None:
     np.testing.assert_allclose(camera.params[:4], [300, 152.5, 160, 60])
     np.testing.assert_array_equal(camera.params[4:], PARAMS["OPENCV"][4:])
     assert (camera.width, camera.height) == (320, 120)
+
+
+def test_a_cropped_camera_sees_what_was_in_that_part() -> None:
+    camera = vg.Camera.from_matrix([[50, 0, 32], [0, 50, 24], [0, 0, 1]], np.eye(4), 64, 48)
+    dot = vg.Gaussians.from_arrays(
+        *(np.float32(a) for a in ([[0.1, 0, 1]], [[0.1, 0.05, 0.1]], [[1, 0, 0, 0]], [0.9], [[[1.0, 0.2, 0.1]]]))
+    )
+    whole, part = dot.render(camera), dot.render(camera.cropped(20, 10, 24, 30))
+    np.testing.assert_array_equal(part, whole[10:40, 20:44])
+
+
+def test_a_tracked_box_gives_the_camera_in_the_vehicles_frame() -> None:
+    ego_from_vehicle = looking_at_the_origin((30.0, 4.0, 1.5))
+    pose = vg.pose_from_box(ego_from_vehicle, ego_from_vehicle @ POSE)
+    np.testing.assert_allclose(pose, POSE, atol=1e-12)
 
 
 def test_a_colmap_pose_is_pycolmaps_inverse() -> None:

@@ -131,13 +131,13 @@ def test_cameras_say_what_is_wrong_with_them() -> None:
     K, pose = np.diag([600.0, 600.0, 1.0]), np.eye(4)
     refused: list[tuple[Any, str]] = [
         (lambda: vg.Camera.from_matrix(np.eye(4), pose, 8, 8), "K: shape (4, 4); allowed: a 3x3 matrix"),
-        (lambda: vg.Camera.from_matrix(K + np.eye(3, k=1), pose, 8, 8), "K: skew 1"),
-        (lambda: vg.Camera.from_matrix(-K, pose, 8, 8), "K: "),
+        (lambda: vg.Camera.from_matrix(K + np.eye(3, k=1), pose, 8, 8), "camera.k: ["),
+        (lambda: vg.Camera.from_matrix(-K, pose, 8, 8), "camera.k: ["),
         (lambda: vg.Camera.from_matrix(K, pose * 2, 8, 8), "vehicle_from_camera: last row"),
         (lambda: vg.Camera.from_matrix(K, np.diag([1, -1, 1, 1]), 8, 8), "vehicle_from_camera: |R^T R - I|"),
         (lambda: vg.Camera.from_matrix(K, np.eye(3), 8, 8), "vehicle_from_camera: shape (3, 3); allowed: a 3x4 or 4x4"),
         (lambda: vg.Camera.from_matrix(K, pose, 0, 8), "camera.size: 0x8"),
-        (lambda: vg.Camera.from_matrix(K, pose, 8, 8, [1, 2, 3]), "distortion: shape (3,)"),
+        (lambda: vg.Camera.from_matrix(K, pose, 8, 8, [1, 2, 3]), "camera.distortion: 3 numbers; allowed: 0, 4, 5 or 8"),
         (lambda: vg.Camera.from_colmap("FOV", 8, 8, [1], pose), "model: FOV; allowed: SIMPLE_PINHOLE (0)"),
         (lambda: vg.Camera.from_colmap(17, 8, 8, [1], pose), "model: 17; allowed"),
         (lambda: vg.Camera.from_colmap("PINHOLE", 8, 8, [1], pose), "camera.params: 1 numbers; allowed: 4 for PINHOLE"),
@@ -146,7 +146,9 @@ def test_cameras_say_what_is_wrong_with_them() -> None:
         (lambda: vg.pose_from_opengl(np.diag([1, 1, -1, 1])), "camera_to_world: |R^T R - I|"),
         (lambda: vg.pose_from_opengl(pose, np.diag([1, 1, -1, 1])), "vehicle_from_world: det = -1"),
         (lambda: vg.similarity_from_points(np.eye(4), np.eye(4)), "source: shape (4, 4); allowed: an (n, 3) array"),
-        (lambda: vg.Camera.from_matrix(K, pose, 8, 8).scaled(0, 1), "camera.size: 0x1"),
+        (lambda: vg.Camera.from_matrix(K, pose, 8, 8).scaled(0, 1), "resized.size: 0x1"),
+        (lambda: vg.Camera.from_matrix(K, pose, 8, 8).cropped(4, 4, 8, 1), "crop: 8x1 at column 4, row 4"),
+        (lambda: vg.pose_from_box(pose, pose * 2), "ego_from_camera: last row"),
     ]
     for call, message in refused:
         with pytest.raises(vg.VgError, match="^" + re.escape(message)) as caught:
@@ -179,9 +181,15 @@ def test_gaussians_say_what_is_wrong_with_them(ellipsoid: Views) -> None:
     for message, change in refused.items():
         with pytest.raises(vg.VgError, match="^" + re.escape(message)):
             vg.Gaussians.from_arrays(**{**good, **change})
+    g = vg.Gaussians.from_arrays(**good)
+    for message, matrix in {
+        "to_from_vehicle: det": np.diag([1, -1, 1, 1]),
+        "to_from_vehicle: shape (3, 4)": np.eye(4)[:3],
+    }.items():
+        with pytest.raises(vg.VgError, match="^" + re.escape(message)):
+            g.transformed(matrix)
     with pytest.raises(TypeError, match="^means: array of float64; allowed: an array of float32"):
         vg.Gaussians.from_arrays(**{**good, "means": np.zeros((2, 3))})
-    g = vg.Gaussians.from_arrays(**good)
     camera = ellipsoid.cameras[0]
     drawn: list[tuple[dict[str, Any], str]] = [
         ({"background": "pink"}, 'background: "pink"; allowed: white, black, transparent'),

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
-from conftest import Views, psnr, same_bytes
+from conftest import Views, looking_at_the_origin, psnr, same_bytes
 
 import vehicle_gaussians as vg
 
@@ -119,6 +119,30 @@ def test_mirroring_flips_y_and_twice_is_nothing(made: vg.Reconstruction) -> None
     np.testing.assert_array_equal(once.means, made.gaussians.means * np.array([1, -1, 1], np.float32))
     np.testing.assert_array_equal(once.quats, made.gaussians.quats * np.array([1, -1, 1, -1], np.float32))
     assert same_bytes(once.mirrored(), made.gaussians)
+
+
+def test_moved_gaussians_look_the_same_to_the_moved_camera(made: vg.Reconstruction, ellipsoid: Views) -> None:
+    world_from_vehicle = looking_at_the_origin((50.0, 40.0, 10.0))
+    world_from_vehicle[:3, :3] *= 2.0
+    moved = made.gaussians.transformed(world_from_vehicle)
+    camera = ellipsoid.cameras[0]
+    pose = camera.vehicle_from_camera
+    world_from_camera = world_from_vehicle @ pose
+    world_from_camera[:3, :3] /= 2.0
+    # Twice as large, twice as far: the same picture, to the rounding of means at 50 m.
+    assert psnr(moved.render(camera.with_pose(world_from_camera)), made.gaussians.render(camera)) > 55
+    np.testing.assert_allclose(moved.scales, 2 * made.gaussians.scales, rtol=1e-6)
+    assert same_bytes(made.gaussians.transformed(np.eye(4)), made.gaussians)
+
+
+def test_merged_gaussians_are_the_ones_and_then_the_others() -> None:
+    few, many = from_random(3, degree=0), from_random(5, degree=2)
+    both = few.merged(many)
+    assert (len(both), both.sh_degree) == (8, 2)
+    np.testing.assert_array_equal(both.means, np.concatenate([few.means, many.means]))
+    np.testing.assert_array_equal(both.sh[:3, :1], few.sh)
+    assert not both.sh[:3, 1:].any()
+    np.testing.assert_array_equal(both.sh[3:], many.sh)
 
 
 def test_a_ply_file_holds_the_gaussians(made: vg.Reconstruction, ellipsoid: Views, tmp_path: Path) -> None:

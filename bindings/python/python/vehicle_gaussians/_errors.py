@@ -33,7 +33,8 @@ class VgError(Exception):
 
     def __init__(self, code: int, message: str) -> None:
         super().__init__(message)
-        self.code = Status(code)
+        # A library newer than this file may know more.
+        self.code = Status(code) if code in list(Status) else Status.INTERNAL
 
     def __reduce__(self) -> tuple[type[VgError], tuple[int, str]]:
         return type(self), (int(self.code), str(self))
