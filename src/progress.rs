@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use std::cell::RefCell;
 use std::ops::ControlFlow;
+use std::thread::{self, JoinHandle};
 
 /// Where a run stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +21,9 @@ pub type ProgressCallback<'a> = dyn FnMut(Progress) -> ControlFlow<()> + 'a;
 /// the same time. They end when this is dropped.
 #[derive(Debug)]
 pub struct Threads {
-    pool: rayon::ThreadPool,
+    /// `None` only while this is dropped.
+    pool: Option<rayon::ThreadPool>,
+    workers: Vec<JoinHandle<()>>,
 }
 
 /// What the names of worker threads begin with.
@@ -37,22 +40,45 @@ impl Threads {
                 format!("0 (all cores) to {MAX_THREADS}"),
             ));
         }
+        let mut workers = Vec::new();
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(count)
-            .thread_name(|i| format!("{THREAD_NAME}{i}"))
+            .spawn_handler(|worker| {
+                let name = format!("{THREAD_NAME}{}", worker.index());
+                workers.push(thread::Builder::new().name(name).spawn(|| worker.run())?);
+                Ok(())
+            })
             .build()
-            .map_err(|e| Error::argument("threads", e.to_string(), "a number the system can start"))?;
-        Ok(Self { pool })
+            .map_err(|e| Error::argument("threads", e.to_string(), "a number the system can start"));
+        // Where one thread could not be started, those before it are on their way out.
+        let mut threads = Self { pool: None, workers };
+        threads.pool = Some(pool?);
+        Ok(threads)
     }
 
     /// How many.
     pub fn count(&self) -> usize {
-        self.pool.current_num_threads()
+        self.pool().current_num_threads()
     }
 
     /// Runs `work` on these threads: rayon inside it uses them and no others.
     pub fn run<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
-        self.pool.install(work)
+        self.pool().install(work)
+    }
+
+    fn pool(&self) -> &rayon::ThreadPool {
+        self.pool.as_ref().expect("there until this is dropped")
+    }
+}
+
+impl Drop for Threads {
+    /// Waits for the threads to be gone, which rayon alone does not: a host may unload the library next.
+    fn drop(&mut self) {
+        drop(self.pool.take());
+        for worker in self.workers.drain(..) {
+            // A worker that panicked has told the caller whose work it was.
+            let _ = worker.join();
+        }
     }
 }
 
@@ -84,5 +110,24 @@ impl<'a> Context<'a> {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Error::Cancelled { stage }),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn the_threads_are_gone_when_the_handle_is() {
+        let threads = Threads::new(3).unwrap();
+        // Each leaves its number in the system's list of threads.
+        let numbers: Vec<std::path::PathBuf> = threads.pool().broadcast(|_| {
+            let link = std::fs::read_link("/proc/thread-self").unwrap();
+            std::path::Path::new("/proc").join(link)
+        });
+        assert!(numbers.len() == 3 && numbers.iter().all(|n| n.exists()));
+        drop(threads);
+        assert!(!numbers.iter().any(|n| n.exists()));
     }
 }

@@ -8,7 +8,7 @@ use vg::gaussians::sh;
 use vg::geometry::frame::{opengl_from_pose, pose_from_colmap, pose_from_opengl};
 use vg::geometry::{Camera, CameraModel, Distortion, Intrinsics, Pose, Similarity};
 use vg::scene::mask::{Label, Mask};
-use vg::scene::undistort::undistorted;
+use vg::scene::undistort::{pinhole_for, undistorted};
 use vg::scene::{DepthMap, RgbImage, View};
 
 fn golden(name: &str) -> Value {
@@ -263,5 +263,27 @@ fn pixels_that_the_lens_did_not_see_are_unknown_and_have_no_depth() {
     for (i, label) in mask.labels().iter().enumerate() {
         assert_eq!(*label == Label::Unknown, depth.depth()[i] == 0.0);
         assert_eq!(*label == Label::Unknown, view.image.pixels()[i] == [0; 3]);
+    }
+}
+
+#[test]
+fn the_pinhole_of_a_crop_from_a_lens_s_corner_holds_all_that_the_crop_saw() {
+    let wide = Distortion::Brown { k: [-0.25, 0.04, 0.0, 0.0, 0.0, 0.0], p: [0.0; 2] };
+    for distortion in [wide, Distortion::Fisheye { k: [0.0; 4] }] {
+        let intrinsics = Intrinsics { fx: 900.0, fy: 900.0, cx: 640.0, cy: 360.0 };
+        let whole =
+            Camera { width: 1280, height: 720, intrinsics, distortion, vehicle_from_camera: Pose::IDENTITY };
+        for (x, y) in [(0, 0), (1080, 0), (0, 570), (1080, 570), (540, 285)] {
+            let part = whole.cropped(x, y, 200, 150).unwrap();
+            let pinhole = pinhole_for(&part).unwrap();
+            for (u, v) in [(0.5, 0.5), (199.5, 0.5), (0.5, 149.5), (199.5, 149.5), (100.0, 75.0)] {
+                let [u, v] = pinhole.project(part.ray([u, v]).unwrap()).unwrap();
+                let (w, h) = (f64::from(pinhole.width), f64::from(pinhole.height));
+                assert!(
+                    (0.0..=w).contains(&u) && (0.0..=h).contains(&v),
+                    "({x}, {y}): ({u}, {v}) of {w}x{h}"
+                );
+            }
+        }
     }
 }

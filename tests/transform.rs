@@ -180,7 +180,7 @@ fn a_mean_where_an_f32_step_exceeds_a_millimetre_is_refused() {
     assert_eq!(model.transformed(&shift(16_383.0)).unwrap().means()[0], [16_383.25, 0.0, 0.0]);
     assert!(model.transformed(&shift(-16_384.0)).is_ok());
     // The limit itself, and what rounds to it.
-    for x in [16_383.75, 16_383.7499, -16_384.25, 4e6, 1e300] {
+    for x in [16_383.75, 16_383.749_9, -16_384.25, 4e6, 1e300] {
         refused(&model, &shift(x), "means[0]");
     }
 }

@@ -361,9 +361,7 @@ pub unsafe extern "C" fn vg_pose_from_box(
     unsafe {
         guarded(out_error, || {
             read::not_null("out", out, "12 numbers")?;
-            let pose = |argument, pointer| {
-                Pose::from_row_major(argument, &read::fixed(argument, pointer)?)
-            };
+            let pose = |argument, pointer| Pose::from_row_major(argument, &read::fixed(argument, pointer)?);
             let vehicle = pose("vehicle_in_ego", vehicle_in_ego)?;
             let camera = pose("camera_in_ego", camera_in_ego)?;
             write_pose(out, &frame::pose_from_box(&vehicle, &camera))

@@ -11,6 +11,7 @@ use std::sync::{Mutex, PoisonError};
 /// Worker threads and scratch memory, made once and named in the options of calls, so that a call neither starts
 /// threads nor allocates what the last one had. Any number of threads may use one context at a time. Free it with
 /// `vg_context_free`, after the last call that uses it has returned; results do not depend on it.
+#[cfg_attr(test, safer_ffi::derive_ReprC, repr(opaque))]
 pub struct vg_context {
     _private: [u8; 0],
 }

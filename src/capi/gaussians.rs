@@ -190,7 +190,11 @@ pub unsafe extern "C" fn vg_gaussians_from_arrays(
             read::zero("arrays.flags", a.flags == 0)?;
             let degree = sh_degree("arrays.sh_degree", a.sh_degree)?;
             if a.count > MAX_COUNT {
-                return Err(Error::argument("arrays.count", a.count.to_string(), format!("0 to {MAX_COUNT}")));
+                return Err(Error::argument(
+                    "arrays.count",
+                    a.count.to_string(),
+                    format!("0 to {MAX_COUNT}"),
+                ));
             }
             let sh = a.count * sh::coefficients(degree) * 3;
             let means = read::numbers::<[f32; 3]>("arrays.positions", a.positions.cast(), a.count)?;

@@ -158,7 +158,9 @@ pub(super) fn extent(
         None => Err(Error::argument(
             format!("{argument}.row_stride"),
             format!("{row_stride} bytes"),
-            format!("0, or at least {row} bytes for {width} pixels of {pixel}, and {height} rows that fit into memory"),
+            format!(
+                "0, or at least {row} bytes for {width} pixels of {pixel}, and {height} rows that fit into memory"
+            ),
         )),
     }
 }

@@ -148,9 +148,9 @@ pub(super) unsafe fn text<'a>(argument: &str, pointer: *const c_char) -> Result<
         return Ok("");
     }
     let bytes = unsafe { CStr::from_ptr(pointer) };
-    bytes.to_str().map_err(|_| {
-        Error::argument(argument, format!("{:?}", bytes.to_string_lossy()), "a UTF-8 string")
-    })
+    bytes
+        .to_str()
+        .map_err(|_| Error::argument(argument, format!("{:?}", bytes.to_string_lossy()), "a UTF-8 string"))
 }
 
 /// A path: NUL-terminated, not empty; any bytes where the system's paths are bytes, else UTF-8.

@@ -79,7 +79,10 @@ unsafe fn log(log: Log, report: &Report) {
             log.line(vg_log_level::Debug, || format!("{}: {:.1} ms", stage.name, stage.ms));
         }
         log.line(vg_log_level::Info, || {
-            format!("{} Gaussians from depth prior {} in {:.1} ms", report.gaussians, report.prior, report.total_ms)
+            format!(
+                "{} Gaussians from depth prior {} in {:.1} ms",
+                report.gaussians, report.prior, report.total_ms
+            )
         });
     }
 }

@@ -197,8 +197,7 @@ pub unsafe extern "C" fn vg_render(
             let target = Target::read(target, &settings, alpha, camera.width, camera.height)?;
             in_context(options.context, |shop| {
                 shop.with_picture(|picture| {
-                    shop.threads
-                        .run(|| shop.renderer.render_into(gaussians, &camera, &settings, picture))?;
+                    shop.threads.run(|| shop.renderer.render_into(gaussians, &camera, &settings, picture))?;
                     target.write(picture);
                     Ok(())
                 })

@@ -233,7 +233,10 @@ fn lent(view: &View, name: &CString) -> vg_view {
         camera: vg_camera::of(&view.camera),
         image: image(view.image.pixels().as_ptr().cast(), vg_format::Rgb8),
         // A label is one byte: 255 is vehicle, and the others lie below 128.
-        mask: view.mask.as_ref().map_or(vg_image::NONE, |m| image(m.labels().as_ptr().cast(), vg_format::Gray8)),
+        mask: view
+            .mask
+            .as_ref()
+            .map_or(vg_image::NONE, |m| image(m.labels().as_ptr().cast(), vg_format::Gray8)),
         depth: view
             .depth
             .as_ref()

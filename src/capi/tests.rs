@@ -1,1 +1,286 @@
-//! The second witness.
+//! The ABI as two witnesses beside cbindgen see it, and panics in every function.
+
+#[path = "../../tests/abi/contents.rs"]
+mod contents;
+#[path = "../../tests/abi/tools.rs"]
+mod tools;
+
+use super::guard::{guarded, injection};
+use super::*;
+use crate::progress::Threads;
+use contents::Contents;
+use std::collections::BTreeSet;
+use std::ffi::CStr;
+use std::fmt::Write;
+use std::path::Path;
+use std::ptr::{null, null_mut};
+
+/// The golden layout without the enumerators, which are plain numbers in Rust.
+fn golden_layout() -> String {
+    let golden = std::fs::read_to_string(tools::golden().join("layout_x86_64.txt")).unwrap();
+    golden.lines().filter(|line| !line.contains(" = ")).fold(String::new(), |text, line| text + line + "\n")
+}
+
+/// Every struct of the header as rustc lays it out.
+fn layout_of_rust() -> String {
+    fn size<T, F>(_: fn(&T) -> &F) -> usize {
+        size_of::<F>()
+    }
+    let mut lines = String::new();
+    macro_rules! lay_out {
+        ($($name:ident { $($field:ident)* })*) => { $(
+            let _ = writeln!(lines, "{} size {} align {}", stringify!($name), size_of::<$name>(), align_of::<$name>());
+            $(
+                let at = std::mem::offset_of!($name, $field);
+                let bytes = size(|s: &$name| &s.$field);
+                let _ = writeln!(lines, "{}.{} at {at} size {bytes}", stringify!($name), stringify!($field));
+            )*
+        )* };
+    }
+    lay_out! {
+        vg_camera { struct_size width height model flags params vehicle_from_camera reserved }
+        vg_context_options { struct_size threads flags }
+        vg_gaussian_arrays { struct_size count positions scales rotations opacities sh sh_degree flags }
+        vg_image { data row_stride width height format flags }
+        vg_image_target {
+            struct_size width height color color_row_stride depth depth_row_stride color_format flags
+        }
+        vg_options {
+            struct_size context prior symmetry sh_degree keep check points vehicle_size progress progress_user log
+            log_user
+        }
+        vg_render_options {
+            struct_size context backend background background_color alpha depth_mode sh_degree antialiased blur
+            near_plane far_plane max_alpha flags
+        }
+        vg_report_figures {
+            struct_size gaussian_count mirrored_count views_used threads prior sh_degree total_ms peak_rss_bytes
+            has_input_error has_box input_psnr_db input_silhouette_iou box_size extent_low extent_high
+        }
+        vg_scene_options {
+            struct_size context vehicle_from_world names name_count depth_scale load_depth flags log log_user
+        }
+        vg_view { struct_size name camera image mask depth }
+    }
+    lines
+}
+
+#[test]
+fn rust_sees_the_golden_layout() {
+    if cfg!(target_arch = "x86_64") {
+        assert_eq!(layout_of_rust(), golden_layout());
+    }
+}
+
+/// Names every struct, so that safer-ffi writes them all into its header.
+#[safer_ffi::ffi_export]
+fn vg_abi_witness(
+    _: &vg_camera,
+    _: &vg_context_options,
+    _: &vg_gaussian_arrays,
+    _: &vg_image_target,
+    _: &vg_options,
+) {
+}
+
+/// The rest: a function of the witness takes few arguments.
+#[safer_ffi::ffi_export]
+fn vg_abi_witness_more(_: &vg_render_options, _: &vg_report_figures, _: &vg_scene_options, _: &vg_view) {}
+
+/// safer-ffi derives each struct's C form from the compiled type, by traits that only FFI-safe types have; cbindgen
+/// reads the source text. Neither knows of the other.
+#[test]
+fn a_second_generator_writes_a_header_of_the_golden_layout() {
+    if !cfg!(target_arch = "x86_64") || !tools::have(&tools::cc(), "gcc", "the second header") {
+        return;
+    }
+    let folder = tools::scratch();
+    let header = folder.path().join("witness.h");
+    safer_ffi::headers::builder().to_file(&header).unwrap().generate().unwrap();
+    let contents = Contents::of(&std::fs::read_to_string(&header).unwrap());
+    assert_eq!(contents.printed_by(&tools::cc(), "c11", &header), golden_layout());
+}
+
+/// Each function with arguments that do not matter: the panic comes first. Status functions get an error object.
+fn every_function() -> Vec<(&'static str, Box<dyn Fn(*mut *mut vg_error) -> Outcome>)> {
+    macro_rules! functions {
+        ($($name:ident ( $($argument:expr),* ) $kind:ident;)*) => { vec![$((
+            stringify!($name),
+            Box::new(|error: *mut *mut vg_error| {
+                let _ = error;
+                functions!(@call $kind, error, $name($($argument),*))
+            }) as Box<dyn Fn(*mut *mut vg_error) -> Outcome>,
+        )),*] };
+        (@call reports, $error:ident, $name:ident($($argument:expr),*)) => {
+            Outcome::Status(unsafe { $name($($argument,)* $error) })
+        };
+        (@call status, $error:ident, $name:ident($($argument:expr),*)) => {
+            Outcome::Silent(unsafe { $name($($argument),*) })
+        };
+        (@call value, $error:ident, $name:ident($($argument:expr),*)) => {
+            Outcome::Value(unsafe { $name($($argument),*) } as usize)
+        };
+        (@call text, $error:ident, $name:ident($($argument:expr),*)) => {
+            Outcome::Text(unsafe { CStr::from_ptr($name($($argument),*)) })
+        };
+        (@call none, $error:ident, $name:ident($($argument:expr),*)) => {{
+            unsafe { $name($($argument),*) };
+            Outcome::Value(0)
+        }};
+    }
+    functions! {
+        vg_error_message(null()) text;
+        vg_error_free(null_mut()) none;
+        vg_context_options_init(null_mut(), 0) status;
+        vg_context_new(null(), null_mut()) reports;
+        vg_context_threads(null()) value;
+        vg_context_free(null_mut()) none;
+        vg_camera_init(null_mut(), 0) status;
+        vg_camera_from_colmap_model(0, null(), 0, 0, 0, null(), null_mut()) reports;
+        vg_camera_from_opencv(null(), null(), 0, 0, 0, 0, null(), null_mut()) reports;
+        vg_camera_scale(null(), 0, 0, null_mut()) reports;
+        vg_camera_crop(null(), 0, 0, 0, 0, null_mut()) reports;
+        vg_camera_project(null(), null(), null_mut()) reports;
+        vg_pose_from_colmap(null(), null(), null(), null_mut()) reports;
+        vg_pose_from_opengl(null(), null(), null_mut()) reports;
+        vg_pose_from_box(null(), null(), null_mut()) reports;
+        vg_view_init(null_mut(), 0) status;
+        vg_options_init(null_mut(), 0) status;
+        vg_report_figures_init(null_mut(), 0) status;
+        vg_report_get_figures(null(), null_mut()) reports;
+        vg_report_json(null()) text;
+        vg_report_point_count(null()) value;
+        vg_report_point_positions(null()) value;
+        vg_report_point_colors(null()) value;
+        vg_report_free(null_mut()) none;
+        vg_gaussian_arrays_init(null_mut(), 0) status;
+        vg_gaussians_count(null()) value;
+        vg_gaussians_sh_degree(null()) value;
+        vg_gaussians_positions(null()) value;
+        vg_gaussians_scales(null()) value;
+        vg_gaussians_rotations(null()) value;
+        vg_gaussians_opacities(null()) value;
+        vg_gaussians_sh(null()) value;
+        vg_gaussians_load_ply(null(), null_mut()) reports;
+        vg_gaussians_save_ply(null(), null()) reports;
+        vg_gaussians_from_arrays(null(), null_mut()) reports;
+        vg_gaussians_transform(null(), null(), null_mut()) reports;
+        vg_gaussians_mirror(null(), null_mut()) reports;
+        vg_gaussians_merge(null(), null(), null_mut()) reports;
+        vg_gaussians_free(null_mut()) none;
+        vg_reconstruct(null(), 0, null(), null_mut(), null_mut()) reports;
+        vg_render_options_init(null_mut(), 0) status;
+        vg_image_target_init(null_mut(), 0) status;
+        vg_render(null(), null(), null(), null()) reports;
+        vg_scene_options_init(null_mut(), 0) status;
+        vg_colmap_open(null(), null(), null_mut()) reports;
+        vg_transforms_open(null(), null(), null_mut()) reports;
+        vg_scene_view_count(null()) value;
+        vg_scene_get_view(null(), 0, null_mut()) reports;
+        vg_scene_free(null_mut()) none;
+        vg_error_code(null()) status;
+    }
+}
+
+/// What a function returned.
+enum Outcome {
+    /// And what it said.
+    Status(vg_status),
+    /// It has no error object.
+    Silent(vg_status),
+    Value(usize),
+    Text(&'static CStr),
+}
+
+#[test]
+fn a_panic_in_any_function_comes_back_as_a_status_with_its_place() {
+    for (name, call) in every_function() {
+        let mut error = null_mut();
+        injection::arm();
+        let outcome = call(&raw mut error);
+        assert!(!injection::is_armed(), "{name} has no guard");
+        match outcome {
+            Outcome::Status(status) => {
+                assert_eq!(status, vg_status::Internal, "{name}");
+                let message = unsafe { CStr::from_ptr(vg_error_message(error)) }.to_str().unwrap();
+                assert!(message.contains("injected") && message.contains("guard.rs:"), "{name}: {message}");
+                unsafe { vg_error_free(error) };
+            }
+            Outcome::Silent(status) => assert_eq!(status, vg_status::Internal, "{name}"),
+            Outcome::Value(value) => assert_eq!(value, 0, "{name}"),
+            Outcome::Text(text) => assert!(text.is_empty(), "{name}"),
+        }
+    }
+}
+
+#[test]
+fn no_function_is_missing_from_that_list() {
+    let header = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("include/vg.h")).unwrap();
+    let declared = contents::functions(&header);
+    let mut listed: BTreeSet<String> = every_function().iter().map(|(name, _)| (*name).to_owned()).collect();
+    // Constants: nothing in them can panic.
+    listed.extend(["vg_version", "vg_abi_version"].map(str::to_owned));
+    assert_eq!(listed, declared);
+}
+
+fn message_of(body: impl FnOnce() -> crate::Result<()>) -> (vg_status, String) {
+    let mut error = null_mut();
+    let status = unsafe { guarded(&raw mut error, body) };
+    let message = unsafe { CStr::from_ptr(vg_error_message(error)) }.to_str().unwrap().to_owned();
+    unsafe { vg_error_free(error) };
+    (status, message)
+}
+
+#[test]
+fn a_panic_on_a_worker_thread_keeps_its_message_and_its_place() {
+    let (status, message) = message_of(|| {
+        Threads::new(2)?.run(|| {
+            rayon::join(|| (), || panic!("on a worker, number {}", 7));
+        });
+        Ok(())
+    });
+    assert_eq!(status, vg_status::Internal);
+    assert!(message.contains("on a worker, number 7 (") && message.contains("tests.rs:"), "{message}");
+}
+
+#[test]
+fn a_panic_without_words_still_has_a_message() {
+    let (status, message) = message_of(|| std::panic::panic_any(7));
+    assert_eq!(status, vg_status::Internal);
+    assert!(message.contains("panic without a message"), "{message}");
+}
+
+/// Run by the next test in a process of its own.
+#[test]
+#[ignore = "prints nothing, which only another process can see"]
+fn panics_quietly() {
+    a_panic_in_any_function_comes_back_as_a_status_with_its_place();
+    a_panic_on_a_worker_thread_keeps_its_message_and_its_place();
+}
+
+#[test]
+fn a_panic_prints_nothing() {
+    let mut child = std::process::Command::new(std::env::current_exe().unwrap());
+    child.args(["--exact", "capi::tests::panics_quietly", "--ignored", "--nocapture", "--test-threads=1"]);
+    let output = tools::output(&mut child);
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success() && out.contains("1 passed"), "{out}{err}");
+    assert!(err.is_empty() && !out.contains("injected") && !out.contains("on a worker"), "{out}{err}");
+}
+
+#[test]
+fn panics_elsewhere_still_reach_the_hosts_hook() {
+    let mut child = std::process::Command::new(std::env::current_exe().unwrap());
+    child.args(["--exact", "capi::tests::panics_outside_the_guard", "--ignored", "--nocapture"]);
+    let output = tools::output(&mut child);
+    let err = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && err.contains("the host's own"), "{err}");
+}
+
+/// Run by the test before in a process of its own.
+#[test]
+#[ignore = "panics, in a process of its own"]
+fn panics_outside_the_guard() {
+    assert_eq!(message_of(|| Ok(())).0, vg_status::Ok);
+    panic!("the host's own");
+}

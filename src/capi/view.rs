@@ -1,9 +1,9 @@
 //! Views: a photograph, its mask, its depth, its camera.
 
 use super::camera::{self, vg_camera};
+use super::guard::guarded;
 use super::image::{self, vg_image};
 use super::read::{self, Versioned};
-use super::guard::guarded;
 use super::status::vg_status;
 use crate::error::{Error, Result};
 use crate::scene::view::MAX_VIEWS;

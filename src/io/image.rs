@@ -34,8 +34,7 @@ pub fn decode(bytes: &[u8], path: &Path) -> Result<Picture> {
     let alpha = transparency(&decoded);
     let rgb = decoded.into_rgb8();
     let (width, height) = rgb.dimensions();
-    let pixels = rgb.as_raw().as_chunks::<3>().0.to_vec();
-    Ok(Picture { image: RgbImage::new(width, height, pixels)?, alpha })
+    Ok(Picture { image: RgbImage::from_owner("image", width, height, rgb.into_raw())?, alpha })
 }
 
 /// A mask: luminance of [`VEHICLE_THRESHOLD`] and above is vehicle. A picture that is transparent somewhere is

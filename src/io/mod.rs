@@ -21,7 +21,9 @@ pub mod transforms;
 pub mod vehicle_frame;
 
 pub use files::write_atomically;
-pub use scene::{NamedCamera, SceneFiles, SceneFormat, SceneIndex, SceneOptions, SceneView, list_scene, open_scene};
+pub use scene::{
+    NamedCamera, SceneFiles, SceneFormat, SceneIndex, SceneOptions, SceneView, list_scene, open_scene,
+};
 pub use vehicle_frame::{
     Alignment, read_known_centers, read_vehicle_from_world, vehicle_from_known_centers,
     write_vehicle_from_world,

@@ -44,8 +44,6 @@ pub fn reconstruct<'a>(
     options: &Options,
     progress: &'a mut ProgressCallback<'a>,
 ) -> Result<Reconstruction> {
-    options.validate()?;
-    scene.validate()?;
     reconstruct_on(&Threads::new(options.threads)?, scene, options, progress)
 }
 

@@ -2,14 +2,18 @@
 
 use super::image::{check_len, strided_rows};
 use crate::error::Result;
+use std::sync::Arc;
 
-/// Planar depth in metres with confidence; a pixel without a measurement holds 0.
+/// Planar depth in metres with confidence; a pixel without a measurement holds 0. Clones share
+/// both.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthMap {
     width: u32,
     height: u32,
-    depth: Vec<f32>,
-    confidence: Option<Vec<f32>>,
+    /// `[height * width]`
+    depth: Arc<[f32]>,
+    /// `[height * width]`
+    confidence: Option<Arc<[f32]>>,
 }
 
 /// Depths beyond this are taken for no measurement, like NaN, infinity and values <= 0.
@@ -18,11 +22,9 @@ pub const MAX_DEPTH_M: f32 = 1e5;
 impl DepthMap {
     /// From depths in row order; whatever is not a measurement (NaN, infinite, <= 0, beyond [`MAX_DEPTH_M`])
     /// becomes 0 = none. `depth.len()` must be `width * height`.
-    pub fn new(width: u32, height: u32, mut depth: Vec<f32>) -> Result<Self> {
+    pub fn new(width: u32, height: u32, depth: Vec<f32>) -> Result<Self> {
         check_len("depth", width, height, depth.len())?;
-        for d in &mut depth {
-            *d = measured(*d);
-        }
+        let depth = depth.into_iter().map(measured).collect();
         Ok(Self { width, height, depth, confidence: None })
     }
 
@@ -42,7 +44,7 @@ impl DepthMap {
     /// The same with a confidence in [0, 1] per pixel.
     pub fn with_confidence(mut self, confidence: Vec<f32>) -> Result<Self> {
         check_len("confidence", self.width, self.height, confidence.len())?;
-        self.confidence = Some(confidence);
+        self.confidence = Some(confidence.into());
         Ok(self)
     }
 

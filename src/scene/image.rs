@@ -1,6 +1,7 @@
 //! 8-bit colour pictures, sRGB-encoded as cameras write them, row 0 at the top.
 
 use crate::error::{Error, Result};
+use bytes::Bytes;
 
 /// Channel order of 8-bit pixels in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,19 +29,42 @@ impl PixelFormat {
     }
 }
 
-/// An RGB picture, rows without gaps.
+/// An RGB picture, rows without gaps. Clones share the pixels, which nobody changes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RgbImage {
     width: u32,
     height: u32,
-    pixels: Vec<[u8; 3]>,
+    /// `[height * width][3]`
+    bytes: Bytes,
 }
 
 impl RgbImage {
     /// From pixels in row order; `pixels.len()` must be `width * height`.
     pub fn new(width: u32, height: u32, pixels: Vec<[u8; 3]>) -> Result<Self> {
         check_len("image", width, height, pixels.len())?;
-        Ok(Self { width, height, pixels })
+        Ok(Self { width, height, bytes: pixels.into_flattened().into() })
+    }
+
+    /// Borrows the pixels where they are: R, G, B in row order without gaps, `width * height * 3` bytes. `owner` keeps
+    /// them, and is dropped with the last clone of the picture (on an error, before this returns). For as long, its
+    /// bytes may not change.
+    pub fn from_owner(
+        argument: &str,
+        width: u32,
+        height: u32,
+        owner: impl AsRef<[u8]> + Send + 'static,
+    ) -> Result<Self> {
+        let bytes = Bytes::from_owner(owner);
+        // Three bytes times the largest size overflow u64.
+        let needed = 3 * u128::from(width) * u128::from(height);
+        if needed == 0 || needed != bytes.len() as u128 {
+            return Err(Error::argument(
+                argument,
+                format!("{} bytes", bytes.len()),
+                format!("{width} * {height} * 3, at least 1x1"),
+            ));
+        }
+        Ok(Self { width, height, bytes })
     }
 
     /// Copies from the caller's buffer, whose rows start `row_stride` bytes apart.
@@ -62,7 +86,7 @@ impl RgbImage {
                 PixelFormat::Bgr8 | PixelFormat::Bgra8 => [p[2], p[1], p[0]],
             }));
         }
-        Ok(Self { width, height, pixels })
+        Ok(Self { width, height, bytes: pixels.into_flattened().into() })
     }
 
     /// Columns.
@@ -77,12 +101,12 @@ impl RgbImage {
 
     /// Pixels in row order. `[height * width]`
     pub fn pixels(&self) -> &[[u8; 3]] {
-        &self.pixels
+        self.bytes.as_chunks().0
     }
 
     /// The pixel in column u, row v.
     pub fn get(&self, u: u32, v: u32) -> [u8; 3] {
-        self.pixels[v as usize * self.width as usize + u as usize]
+        self.pixels()[v as usize * self.width as usize + u as usize]
     }
 }
 
@@ -132,6 +156,64 @@ mod tests {
         assert_eq!(image.pixels(), [[3, 2, 1], [6, 5, 4], [9, 8, 7], [12, 11, 10]]);
     }
 
+    /// Tells by its drop when a picture has let go of its pixels.
+    struct Lent {
+        bytes: Vec<u8>,
+        released: std::sync::mpsc::Sender<()>,
+    }
+
+    impl AsRef<[u8]> for Lent {
+        fn as_ref(&self) -> &[u8] {
+            &self.bytes
+        }
+    }
+
+    impl Drop for Lent {
+        fn drop(&mut self) {
+            let _ = self.released.send(());
+        }
+    }
+
+    #[test]
+    fn lent_pixels_are_read_in_place_and_given_back_with_the_last_clone() {
+        let (released, given_back) = std::sync::mpsc::channel();
+        let bytes: Vec<u8> = (0..18).collect();
+        let address = bytes.as_ptr();
+        let image = RgbImage::from_owner("image", 3, 2, Lent { bytes, released }).unwrap();
+        assert_eq!(image.pixels().as_ptr().cast(), address);
+        assert_eq!((image.get(0, 0), image.get(2, 1)), ([0, 1, 2], [15, 16, 17]));
+        let clone = image.clone();
+        drop(image);
+        assert!(given_back.try_recv().is_err());
+        assert_eq!(
+            clone,
+            RgbImage::from_strided("image", &(0..18).collect::<Vec<_>>(), 3, 2, 9, PixelFormat::Rgb8)
+                .unwrap()
+        );
+        drop(clone);
+        assert!(given_back.try_recv().is_ok());
+    }
+
+    #[test]
+    fn lent_pixels_of_another_size_are_refused_and_given_back() {
+        for (width, height, bytes) in [(3, 2, 17), (3, 2, 19), (0, 2, 0), (u32::MAX, u32::MAX, 3)] {
+            let (released, given_back) = std::sync::mpsc::channel();
+            let lent = Lent { bytes: vec![0; bytes], released };
+            let error = RgbImage::from_owner("views[0].image", width, height, lent).unwrap_err().to_string();
+            assert!(error.starts_with("views[0].image: "), "{error}");
+            assert!(given_back.try_recv().is_ok());
+        }
+    }
+
+    #[test]
+    fn pixels_that_are_moved_in_are_not_copied_and_clones_share_them() {
+        let pixels = vec![[1, 2, 3]; 6];
+        let address = pixels.as_ptr();
+        let image = RgbImage::new(3, 2, pixels).unwrap();
+        assert_eq!(image.pixels().as_ptr(), address);
+        assert_eq!(image.clone().pixels().as_ptr(), address);
+    }
+
     #[test]
     fn a_buffer_that_is_too_short_or_a_stride_that_overflows_is_refused() {
         let data = [0u8; 13];
@@ -141,5 +223,3 @@ mod tests {
         }
     }
 }
-impl RgbImage { /// TEMP
- pub fn from_owner(argument:&str,width:u32,height:u32,owner: impl AsRef<[u8]>+Send+'static)->Result<Self>{ Self::from_strided(argument, owner.as_ref(), width,height,width as usize*3, PixelFormat::Rgb8)} }

@@ -2,6 +2,7 @@
 
 use super::image::{check_len, strided_rows};
 use crate::error::Result;
+use std::sync::Arc;
 
 /// Mask values at or above this are vehicle.
 pub const VEHICLE_THRESHOLD: u8 = 128;
@@ -18,19 +19,20 @@ pub enum Label {
     Vehicle = 255,
 }
 
-/// One label per pixel, rows without gaps.
+/// One label per pixel, rows without gaps. Clones share the labels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mask {
     width: u32,
     height: u32,
-    labels: Vec<Label>,
+    /// `[height * width]`
+    labels: Arc<[Label]>,
 }
 
 impl Mask {
     /// From labels in row order; `labels.len()` must be `width * height`.
     pub fn new(width: u32, height: u32, labels: Vec<Label>) -> Result<Self> {
         check_len("mask", width, height, labels.len())?;
-        Ok(Self { width, height, labels })
+        Ok(Self { width, height, labels: labels.into() })
     }
 
     /// Copies from the caller's 8-bit buffer, whose rows start `row_stride` bytes apart; values of

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 /// The pinhole may be this many times the source's width and height; wider corners are cut.
 const MAX_GROWTH: f64 = 2.0;
 
-/// The view on a pinhole grid; a pinhole view is returned as it is.
+/// The view on a pinhole grid; a pinhole view is returned as it is, sharing its pixels.
 pub fn undistorted(view: &View) -> Result<View> {
     if view.camera.distortion.is_none() {
         let camera = Camera { distortion: Distortion::None, ..view.camera };
@@ -77,10 +77,12 @@ pub fn pinhole_for(source: &Camera) -> Result<Camera> {
             "a lens model that can be inverted inside the picture",
         ));
     }
-    // Never beyond the allowed growth around the source's own frame, nor beyond what a camera may be.
+    // Never beyond the allowed growth, nor beyond what a camera may be. What is cut is cut evenly around the source's
+    // own frame where the picture reaches beyond it on both sides; a crop from a lens's corner lies wholly to one side.
     let cap = |low: f64, high: f64, size: f64| {
-        let margin = 0.5 * (MAX_GROWTH - 1.0) * size;
-        let (low, high) = (low.max(-margin).floor(), high.min(size + margin).ceil());
+        let (margin, widest) = (0.5 * (MAX_GROWTH - 1.0) * size, MAX_GROWTH * size);
+        let start = (-margin).clamp(low, (high - widest).max(low));
+        let (low, high) = (start.floor(), high.min(start + widest).ceil());
         (low, (high - low).clamp(1.0, f64::from(crate::geometry::camera::MAX_SIDE)))
     };
     let (x0, width) = cap(low[0], high[0], w);
@@ -178,5 +180,34 @@ fn depth_at(depth: &DepthMap, taps: &Taps) -> f32 {
         taps.blend(around.map(f32::recip)).recip()
     } else {
         nearest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Pose;
+
+    #[test]
+    fn a_pinhole_view_comes_back_without_a_copy_of_any_pixel() {
+        let intrinsics = Intrinsics { fx: 4.0, fy: 4.0, cx: 2.0, cy: 1.5 };
+        let depth = DepthMap::new(4, 3, vec![2.0; 12]).unwrap().with_confidence(vec![0.5; 12]).unwrap();
+        let view = View {
+            name: "pinhole".into(),
+            camera: Camera::pinhole(4, 3, intrinsics, Pose::IDENTITY).unwrap(),
+            image: RgbImage::new(4, 3, vec![[7; 3]; 12]).unwrap(),
+            mask: Some(Mask::new(4, 3, vec![Label::Vehicle; 12]).unwrap()),
+            depth: Some(depth),
+        };
+        let same = undistorted(&view).unwrap();
+        assert_eq!(same.camera, view.camera);
+        assert_eq!(same.image.pixels().as_ptr(), view.image.pixels().as_ptr());
+        let labels = |view: &View| view.mask.as_ref().unwrap().labels().as_ptr();
+        assert_eq!(labels(&same), labels(&view));
+        let depth = |view: &View| {
+            let map = view.depth.as_ref().unwrap();
+            (map.depth().as_ptr(), map.confidence().unwrap().as_ptr())
+        };
+        assert_eq!(depth(&same), depth(&view));
     }
 }

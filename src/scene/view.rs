@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 /// Most views a scene may hold.
 pub const MAX_VIEWS: usize = 4096;
 
-/// One photograph: picture, camera, and which pixels show the vehicle.
+/// One photograph: picture, camera, and which pixels show the vehicle. Clones share all that is per pixel.
 #[derive(Clone, Debug)]
 pub struct View {
     /// Name for messages and output files, for example the picture's file name.

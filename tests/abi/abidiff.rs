@@ -1,36 +1,42 @@
 //! The types of every function and field, as the compiler wrote them down, against those of the first release.
 
+use crate::abixml;
 use crate::symbols::declared;
-use crate::tools::{golden, have, output, run, scratch, target};
+use crate::tools::{golden, have, output, run, say, scratch, target};
 use std::process::Command;
 
 #[test]
 fn abidiff_finds_nothing_that_would_break_a_program() {
+    if !cfg!(target_arch = "x86_64") {
+        say("skipped: the golden types are of x86-64");
+        return;
+    }
     let what = "types of functions and fields";
     if !have("abidiff", "abigail-tools", what) || !have("abidw", "abigail-tools", what) {
         return;
     }
-    let library = target().join("libvg.so");
-    let golden = golden().join("libvg-0.abi");
     let folder = scratch();
-    let today = folder.path().join("today.abi");
-    let mut dump = Command::new("abidw");
-    dump.args(["--no-comp-dir-path", "--no-corpus-path", "--no-show-locs", "--no-architecture"]);
-    run(dump.arg("--out-file").arg(&today).arg(&library));
-    let written = std::fs::read_to_string(&today).unwrap();
+    let dump = folder.path().join("whole.abi");
+    let mut abidw = Command::new("abidw");
+    abidw.args(["--no-comp-dir-path", "--no-corpus-path", "--no-show-locs"]);
+    run(abidw.arg("--out-file").arg(&dump).arg(target().join("libvg.so")));
+    let found = abixml::of_c_functions(&std::fs::read_to_string(&dump).unwrap());
     // Without debug information there is nothing to compare, and abidiff is content.
     for function in declared() {
         assert!(
-            written.contains(&format!("mangled-name='{function}'")),
+            found.contains(&format!("mangled-name='{function}'")),
             "{function}: no type information: was the library built without debug information?"
         );
     }
+    let golden = golden().join("libvg-0-x86_64.abi");
     if std::env::var_os("VG_BLESS").is_some() {
-        std::fs::write(&golden, written).unwrap();
+        std::fs::write(&golden, found).unwrap();
         return;
     }
+    let today = folder.path().join("today.abi");
+    std::fs::write(&today, found).unwrap();
     // New functions are welcome.
-    let result = output(Command::new("abidiff").arg("--no-added-syms").arg(&golden).arg(&library));
+    let result = output(Command::new("abidiff").arg("--no-added-syms").arg(&golden).arg(&today));
     assert_eq!(
         result.status.code(),
         Some(0),

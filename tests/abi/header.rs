@@ -5,8 +5,18 @@ use std::process::Command;
 
 /// The chapters of the header.
 const CHAPTERS: [&str; 12] = [
-    "version", "status", "context", "image", "camera", "view", "options", "report", "gaussians", "reconstruct",
-    "render", "scene",
+    "version",
+    "status",
+    "context",
+    "image",
+    "camera",
+    "view",
+    "options",
+    "report",
+    "gaussians",
+    "reconstruct",
+    "render",
+    "scene",
 ];
 
 #[test]
@@ -71,11 +81,22 @@ fn two_files_of_one_program_may_include_it() {
     let include = "#include \"vg.h\"\n#include \"vg.h\"\n";
     let first = folder.path().join("first.c");
     let second = folder.path().join("second.c");
-    std::fs::write(&first, format!("{include}int other(void);\nint main(void) {{ return other(); }}\n")).unwrap();
-    std::fs::write(&second, format!("{include}int other(void);\nint other(void) {{ return VG_STATUS_OK; }}\n")).unwrap();
+    std::fs::write(&first, format!("{include}int other(void);\nint main(void) {{ return other(); }}\n"))
+        .unwrap();
+    std::fs::write(
+        &second,
+        format!("{include}int other(void);\nint other(void) {{ return VG_STATUS_OK; }}\n"),
+    )
+    .unwrap();
     let program = folder.path().join("program");
     let mut command = Command::new(cc());
-    command.args(STRICT).arg("-I").arg(root().join("include")).args([&first, &second]).arg("-o").arg(&program);
+    command
+        .args(STRICT)
+        .arg("-I")
+        .arg(root().join("include"))
+        .args([&first, &second])
+        .arg("-o")
+        .arg(&program);
     run(&mut command);
     run(&mut Command::new(program));
 }

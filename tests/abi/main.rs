@@ -16,13 +16,18 @@
 //! `VG_BLESS=1 cargo test --test abi` rewrites the golden files, for a change that `CHANGELOG.md` argues for.
 //! `VG_NO_SKIP=1` makes a missing tool a failure.
 
+// The tests are callers of C functions.
+#![allow(unsafe_code)]
+
 mod abidiff;
+mod abixml;
 mod arguments;
 mod buffers;
 mod client;
+#[path = "../common/mod.rs"]
+mod common;
+mod contents;
 mod header;
 mod layout;
 mod symbols;
 mod tools;
-#[path = "../common/mod.rs"]
-mod common;

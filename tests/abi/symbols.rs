@@ -1,5 +1,6 @@
 //! What the shared library exports, and the name under which the loader looks for it.
 
+use crate::contents::functions;
 use crate::tools::{assert_golden, golden, have, root, run, target};
 use std::collections::BTreeSet;
 use std::process::Command;
@@ -7,13 +8,7 @@ use std::process::Command;
 /// Names of the functions in the header.
 pub(crate) fn declared() -> BTreeSet<String> {
     let header = std::fs::read_to_string(root().join("include/vg.h")).unwrap();
-    let after_api = header.split("VG_API\n").skip(1);
-    after_api
-        .map(|declaration| {
-            let name = declaration.split('(').next().unwrap();
-            name.rsplit([' ', '*']).next().unwrap().to_owned()
-        })
-        .collect()
+    functions(&header)
 }
 
 #[test]
@@ -21,7 +16,8 @@ fn exactly_the_functions_of_the_golden_list_are_exported() {
     if !have("nm", "binutils", "exported symbols") {
         return;
     }
-    let listing = run(Command::new("nm").args(["-D", "--defined-only", "-f", "posix"]).arg(target().join("libvg.so")));
+    let listing =
+        run(Command::new("nm").args(["-D", "--defined-only", "-f", "posix"]).arg(target().join("libvg.so")));
     let mut exported: Vec<String> = listing
         .lines()
         .map(|line| {
@@ -34,7 +30,8 @@ fn exactly_the_functions_of_the_golden_list_are_exported() {
     let why = "programs may call any function that was ever exported; a new one is blessed with VG_BLESS=1";
     assert_golden(&golden().join("symbols.txt"), &found, why);
 
-    let exported: BTreeSet<String> = exported.iter().map(|l| l.split(' ').next().unwrap().to_owned()).collect();
+    let exported: BTreeSet<String> =
+        exported.iter().map(|l| l.split(' ').next().unwrap().to_owned()).collect();
     assert_eq!(exported, declared(), "the library exports what the header declares");
 }
 

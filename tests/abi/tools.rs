@@ -83,7 +83,14 @@ pub fn library_folder(folder: &Path) {
 }
 
 /// Compiles one C file into a program that loads the shared library from `folder`.
-pub fn compile(compiler: &str, flags: &[&str], include: &Path, source: &Path, folder: &Path, name: &str) -> PathBuf {
+pub fn compile(
+    compiler: &str,
+    flags: &[&str],
+    include: &Path,
+    source: &Path,
+    folder: &Path,
+    name: &str,
+) -> PathBuf {
     let program = folder.join(name);
     let mut command = Command::new(compiler);
     command.args(flags).arg("-I").arg(include).arg(source).arg("-o").arg(&program);

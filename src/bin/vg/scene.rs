@@ -9,7 +9,7 @@ use vg::io::{SceneFiles, SceneIndex, SceneOptions};
 pub(crate) fn options(frame: &FrameArgs, depth_scale: Option<f64>, load_depth: bool) -> Result<SceneOptions> {
     let read = |path: &PathBuf| vg::io::read_vehicle_from_world(path);
     let vehicle_from_world = frame.vehicle_from_world.as_ref().map(read).transpose()?;
-    Ok(SceneOptions { views: None, vehicle_from_world, depth_scale, load_depth })
+    Ok(SceneOptions { vehicle_from_world, depth_scale, load_depth, ..SceneOptions::default() })
 }
 
 /// Reads the views of these names.
