@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,9 +40,9 @@ def looking_at_the_origin(center: npt.ArrayLike) -> npt.NDArray[np.float64]:
     return pose
 
 
-def ellipsoid_view(center: npt.ArrayLike, width: int = 96, height: int = 72) -> tuple[
-    npt.NDArray[np.uint8], npt.NDArray[np.bool_], npt.NDArray[np.float32], vg.Camera
-]:
+def ellipsoid_view(
+    center: npt.ArrayLike, width: int = 96, height: int = 72
+) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.bool_], npt.NDArray[np.float32], vg.Camera]:
     """Picture (coloured by position), mask and depth by ray casting through pixel centres."""
     pose = looking_at_the_origin(center)
     focal = 1.2 * width
@@ -99,7 +100,7 @@ def psnr(a: npt.NDArray[np.uint8], b: npt.NDArray[np.uint8]) -> float:
     """dB, full frame."""
     assert a.shape == b.shape and a.dtype == b.dtype == np.uint8
     error = np.mean((a.astype(float) - b.astype(float)) ** 2)
-    return float(10 * np.log10(255.0**2 / error))
+    return float(10 * np.log10(255.0**2 / error)) if error > 0 else math.inf
 
 
 def same_bytes(a: vg.Gaussians, b: vg.Gaussians) -> bool:

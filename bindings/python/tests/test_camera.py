@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pycolmap
 import pytest
-from conftest import looking_at_the_origin
 
 import vehicle_gaussians as vg
+from conftest import looking_at_the_origin
 
 POSE = looking_at_the_origin((5.0, -4.0, 1.0))
 PARAMS = {
@@ -70,7 +70,7 @@ def test_a_point_is_drawn_at_its_pixel() -> None:
     def brightest(cx: float) -> np.ndarray:
         camera = vg.Camera.from_matrix([[50, 0, cx], [0, 50, cx], [0, 0, 1]], np.eye(4), 8, 8)
         dot = vg.Gaussians.from_arrays(
-            *(np.float32(a) for a in ([[0, 0, 1]], [[1e-3] * 3], [[1, 0, 0, 0]], [0.9], [[[1.77] * 3]]))
+            *(np.array(a, np.float32) for a in ([[0, 0, 1]], [[1e-3] * 3], [[1, 0, 0, 0]], [0.9], [[[1.77] * 3]]))
         )
         return dot.render(camera, "black")[..., 0]
 
@@ -101,7 +101,10 @@ def test_scaling_scales_the_intrinsics_and_keeps_the_lens() -> None:
 def test_a_cropped_camera_sees_what_was_in_that_part() -> None:
     camera = vg.Camera.from_matrix([[50, 0, 32], [0, 50, 24], [0, 0, 1]], np.eye(4), 64, 48)
     dot = vg.Gaussians.from_arrays(
-        *(np.float32(a) for a in ([[0.1, 0, 1]], [[0.1, 0.05, 0.1]], [[1, 0, 0, 0]], [0.9], [[[1.0, 0.2, 0.1]]]))
+        *(
+            np.array(a, np.float32)
+            for a in ([[0.1, 0, 1]], [[0.1, 0.05, 0.1]], [[1, 0, 0, 0]], [0.9], [[[1.0, 0.2, 0.1]]])
+        )
     )
     whole, part = dot.render(camera), dot.render(camera.cropped(20, 10, 24, 30))
     np.testing.assert_array_equal(part, whole[10:40, 20:44])

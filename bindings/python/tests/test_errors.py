@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import SEDAN, Views
 
 import vehicle_gaussians as vg
+from conftest import SEDAN, Views
 from vehicle_gaussians import Status
 
 
@@ -36,14 +36,26 @@ def test_an_error_survives_pickling() -> None:
 
 
 WRONG_TYPES: dict[str, tuple[str, Any, str]] = {
-    "float image": ("images", lambda a: a.astype(np.float32), "images[2]: array of float32; allowed: a NumPy array of uint8"),
+    "float image": (
+        "images",
+        lambda a: a.astype(np.float32),
+        "images[2]: array of float32; allowed: a NumPy array of uint8",
+    ),
     "int image": ("images", lambda a: a.astype(np.int64), "images[2]: array of int64; allowed: a NumPy array of uint8"),
     "no image": ("images", lambda a: None, "images[2]: NoneType; allowed: a NumPy array of uint8"),
     "text": ("images", lambda a: "car.png", "images[2]: str; allowed: a NumPy array of uint8"),
     "ragged": ("images", lambda a: [[1], [1, 2]], "images[2]: list; allowed: a NumPy array of uint8"),
     "float mask": ("masks", lambda a: a.astype(float), "masks[2]: array of float64; allowed: a NumPy array of bool"),
-    "double depth": ("depths", lambda a: a.astype(float), "depths[2]: array of float64; allowed: a NumPy array of float32"),
-    "millimetres": ("depths", lambda a: a.astype(np.uint16), "depths[2]: array of uint16; allowed: a NumPy array of float32"),
+    "double depth": (
+        "depths",
+        lambda a: a.astype(float),
+        "depths[2]: array of float64; allowed: a NumPy array of float32",
+    ),
+    "millimetres": (
+        "depths",
+        lambda a: a.astype(np.uint16),
+        "depths[2]: array of uint16; allowed: a NumPy array of float32",
+    ),
     "other endian": ("depths", lambda a: a.astype(">f4"), "depths[2]: array of >f4; allowed: a NumPy array of float32"),
     "no camera": ("cameras", lambda a: np.eye(4), "cameras[2]: ndarray; allowed: a Camera"),
 }
@@ -52,24 +64,36 @@ WRONG_TYPES: dict[str, tuple[str, Any, str]] = {
 @pytest.mark.parametrize("case", WRONG_TYPES)
 def test_a_wrong_type_is_a_type_error_that_names_the_argument(case: str, ellipsoid: Views) -> None:
     which, change, message = WRONG_TYPES[case]
-    lists: dict[str, list[Any]] = {name: list(getattr(ellipsoid, name)) for name in ("images", "masks", "depths", "cameras")}
+    lists: dict[str, list[Any]] = {
+        name: list(getattr(ellipsoid, name)) for name in ("images", "masks", "depths", "cameras")
+    }
     lists[which][2] = change(lists[which][2])
     with pytest.raises(TypeError, match="^" + re.escape(message)):
         vg.reconstruct(**lists)
 
 
 WRONG_VALUES: dict[str, tuple[str, Any, str]] = {
-    "grey image": ("images", lambda a: a[..., 0], "images[2]: shape (72, 96); allowed: (72, 96, 3) or (72, 96, 4), its camera's size"),
+    "grey image": (
+        "images",
+        lambda a: a[..., 0],
+        "images[2]: shape (72, 96); allowed: (72, 96, 3) or (72, 96, 4), its camera's size",
+    ),
     "turned image": ("images", lambda a: a.swapaxes(0, 1), "images[2]: shape (96, 72, 3); allowed: (72, 96, 3)"),
     "small mask": ("masks", lambda a: a[:10], "masks[2]: shape (10, 96); allowed: (72, 96), its camera's size"),
-    "deep depth": ("depths", lambda a: a[..., None], "depths[2]: shape (72, 96, 1); allowed: (72, 96), its camera's size"),
+    "deep depth": (
+        "depths",
+        lambda a: a[..., None],
+        "depths[2]: shape (72, 96, 1); allowed: (72, 96), its camera's size",
+    ),
 }
 
 
 @pytest.mark.parametrize("case", WRONG_VALUES)
 def test_a_wrong_shape_is_an_argument_error(case: str, ellipsoid: Views) -> None:
     which, change, message = WRONG_VALUES[case]
-    lists: dict[str, list[Any]] = {name: list(getattr(ellipsoid, name)) for name in ("images", "masks", "depths", "cameras")}
+    lists: dict[str, list[Any]] = {
+        name: list(getattr(ellipsoid, name)) for name in ("images", "masks", "depths", "cameras")
+    }
     lists[which][2] = change(lists[which][2])
     with pytest.raises(vg.VgError, match="^" + re.escape(message)) as caught:
         vg.reconstruct(**lists)
@@ -92,7 +116,10 @@ OPTIONS: list[tuple[dict[str, Any], str]] = [
     ({"symmetry": "yes"}, 'symmetry: "yes"; allowed: auto, always, never'),
     ({"keep": ["roof"]}, 'keep: "roof"; allowed: duplicate-views'),
     ({"sh_degree": 4}, "sh_degree: 4; allowed: 0 to 3"),
-    ({"vehicle_size": (4, 2, 1000)}, "vehicle_size: [4.0, 2.0, 1000.0]; allowed: length, width, height, each 0.1 to 30 m"),
+    (
+        {"vehicle_size": (4, 2, 1000)},
+        "vehicle_size: [4.0, 2.0, 1000.0]; allowed: length, width, height, each 0.1 to 30 m",
+    ),
     ({"threads": 100_000}, "threads: 100000; allowed: 0 (all cores) to 1024"),
 ]
 
@@ -137,7 +164,10 @@ def test_cameras_say_what_is_wrong_with_them() -> None:
         (lambda: vg.Camera.from_matrix(K, np.diag([1, -1, 1, 1]), 8, 8), "vehicle_from_camera: |R^T R - I|"),
         (lambda: vg.Camera.from_matrix(K, np.eye(3), 8, 8), "vehicle_from_camera: shape (3, 3); allowed: a 3x4 or 4x4"),
         (lambda: vg.Camera.from_matrix(K, pose, 0, 8), "camera.size: 0x8"),
-        (lambda: vg.Camera.from_matrix(K, pose, 8, 8, [1, 2, 3]), "camera.distortion: 3 numbers; allowed: 0, 4, 5 or 8"),
+        (
+            lambda: vg.Camera.from_matrix(K, pose, 8, 8, [1, 2, 3]),
+            "camera.distortion: 3 numbers; allowed: 0, 4, 5 or 8",
+        ),
         (lambda: vg.Camera.from_colmap("FOV", 8, 8, [1], pose), "model: FOV; allowed: SIMPLE_PINHOLE (0)"),
         (lambda: vg.Camera.from_colmap(17, 8, 8, [1], pose), "model: 17; allowed"),
         (lambda: vg.Camera.from_colmap("PINHOLE", 8, 8, [1], pose), "camera.params: 1 numbers; allowed: 4 for PINHOLE"),
@@ -157,7 +187,7 @@ def test_cameras_say_what_is_wrong_with_them() -> None:
     with pytest.raises(TypeError, match="^K: str; allowed: a 3x3 matrix"):
         vg.Camera.from_matrix("K", pose, 8, 8)
     with pytest.raises(TypeError, match="^model: float; allowed: COLMAP's name or number"):
-        vg.Camera.from_colmap(1.5, 8, 8, [1], pose)  # type: ignore[arg-type]
+        vg.Camera.from_colmap(1.5, 8, 8, [1], pose)
 
 
 def test_gaussians_say_what_is_wrong_with_them(ellipsoid: Views) -> None:
@@ -202,9 +232,9 @@ def test_gaussians_say_what_is_wrong_with_them(ellipsoid: Views) -> None:
         with pytest.raises(vg.VgError, match="^" + re.escape(message)):
             g.render(camera, **options)
     with pytest.raises(TypeError, match="^dtype: float64; allowed: uint8 or float32"):
-        g.render(camera, dtype=np.float64)  # type: ignore[call-overload]
+        g.render(camera, dtype=np.float64)
     with pytest.raises(TypeError, match="camera"):
-        g.render(np.eye(4))  # type: ignore[call-overload]
+        g.render(np.eye(4))
 
 
 def test_a_panic_is_an_internal_error_and_prints_nothing() -> None:

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, SEDAN, on_white, psnr
 from PIL import Image
 
 import vehicle_gaussians as vg
+from conftest import REPOSITORY, SEDAN, on_white, psnr
 
 EXAMPLES = REPOSITORY / "python-examples"
 
@@ -31,9 +31,7 @@ def unseen_psnr(asset: Path, unseen: vg.Scene) -> float:
     return float(np.mean([psnr(gaussians.render(c), on_white(i, m)) for c, i, m in views]))
 
 
-def test_quickstart_draws_the_side_nobody_photographed(
-    tmp_path: Path, sedan: vg.Scene, unseen: vg.Scene
-) -> None:
+def test_quickstart_draws_the_side_nobody_photographed(tmp_path: Path, sedan: vg.Scene, unseen: vg.Scene) -> None:
     pytest.importorskip("matplotlib")
     said = run("quickstart.py", cwd=tmp_path)
     assert "from 4 photographs" in said
@@ -77,11 +75,18 @@ def test_a_colmap_model_that_pycolmap_wrote_reads_alike_here_and_there(tmp_path:
     pycolmap.Reconstruction(SEDAN / "sparse" / "0").write(tmp_path / "car" / "sparse" / "0")
     similarity = SEDAN / "vehicle_from_world.json"
     names = ["000.png", "001.png", "002.png", "003.png"]
-    run(
-        "colmap_to_asset.py", "car", "-o", "a.ply", "--vehicle-from-world", similarity, "--views", *names, cwd=tmp_path
-    )
+    run("colmap_to_asset.py", "car", "-o", "a.ply", "--vehicle-from-world", similarity, "--views", *names, cwd=tmp_path)
     scene = vg.open_scene(tmp_path / "car", names, similarity)
     made = vg.reconstruct(scene.images, scene.masks, scene.cameras)
     theirs = vg.Gaussians.load_ply(tmp_path / "a.ply")
     assert abs(len(theirs) - len(made.gaussians)) < 0.001 * len(theirs)
     assert abs(unseen_psnr(tmp_path / "a.ply", unseen) - 22.73) < 0.3
+
+
+def test_the_unseen_side_comes_through_ctypes_alone(tmp_path: Path, unseen: vg.Scene) -> None:
+    said = run("ctypes_onesided.py", "-o", "out", cwd=tmp_path)
+    assert said.startswith(f"libvg {vg.__version__}: Gaussians(")
+    for name, image, mask in zip(unseen.names, unseen.images, unseen.masks, strict=True):
+        with Image.open(tmp_path / "out" / name) as picture:
+            assert psnr(np.asarray(picture), on_white(image, mask)) > 21
+    assert unseen_psnr(tmp_path / "out" / "car.ply", unseen) > 22.4

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
-from conftest import Views, looking_at_the_origin, psnr, same_bytes
 
 import vehicle_gaussians as vg
+from conftest import Views, looking_at_the_origin, psnr, same_bytes
 
 ARRAYS = ("means", "scales", "quats", "opacities", "sh")
 
@@ -184,15 +184,15 @@ def test_float_pictures_are_the_byte_pictures_before_rounding(made: vg.Reconstru
         assert precise.dtype == np.float32
         rounded = np.rint(np.clip(precise, 0, 1) * np.float32(255))
         assert np.abs(rounded - render(camera, background).astype(np.float32)).max() <= 1
-    np.testing.assert_array_equal(render(camera, dtype="float32"), render(camera, dtype=np.dtype("f4")))  # type: ignore[call-overload]
+    np.testing.assert_array_equal(render(camera, dtype="float32"), render(camera, dtype=np.dtype("f4")))
 
 
 def test_depth_is_that_of_the_surface_in_metres(made: vg.Reconstruction, ellipsoid: Views) -> None:
     for dtype in ("uint8", "float32"):
-        picture, depth = made.gaussians.render(ellipsoid.cameras[0], depth=True, dtype=dtype)  # type: ignore[call-overload]
+        picture, depth = made.gaussians.render(ellipsoid.cameras[0], depth=True, dtype=dtype)
         assert picture.shape == (72, 96, 3) and picture.dtype == dtype
         assert depth.shape == (72, 96) and depth.dtype == np.float32
-        np.testing.assert_array_equal(picture, made.gaussians.render(ellipsoid.cameras[0], dtype=dtype))  # type: ignore[call-overload]
+        np.testing.assert_array_equal(picture, made.gaussians.render(ellipsoid.cameras[0], dtype=dtype))
     # A pixel's footprint is 6 cm wide, and on a slanted surface spans more depth than that.
     inner = inside(ellipsoid.masks[0])
     assert np.abs(depth - ellipsoid.depths[0])[inner].mean() < 0.06

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import UNSEEN, Views, on_white, psnr, same_bytes
 from PIL import Image
 
 import vehicle_gaussians as vg
+from conftest import UNSEEN, Views, on_white, psnr, same_bytes
 
 
 def test_the_unseen_side_of_the_sample_looks_like_its_photographs(
@@ -37,9 +37,7 @@ def test_the_report_is_a_dict_with_the_names_of_the_views(sedan_made: vg.Reconst
     assert [stage["name"] for stage in report["stages"]][-1] == "check"
 
 
-def test_points_are_metric_and_coloured_and_only_made_when_asked_for(
-    ellipsoid: Views, made: vg.Reconstruction
-) -> None:
+def test_points_are_metric_and_coloured_and_only_made_when_asked_for(ellipsoid: Views, made: vg.Reconstruction) -> None:
     assert made.points is None
     again = vg.reconstruct(
         ellipsoid.images, ellipsoid.masks, ellipsoid.cameras, ellipsoid.depths, points=True, check=False

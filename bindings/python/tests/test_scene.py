@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import INPUTS, SEDAN
 from PIL import Image
 
 import vehicle_gaussians as vg
+from conftest import INPUTS, SEDAN
 from vehicle_gaussians.__main__ import main
 
 
@@ -61,9 +61,7 @@ def test_what_looks_like_a_mistake_is_a_warning(tmp_path: Path) -> None:
     assert caught[0].filename == __file__
 
 
-def test_the_command_makes_a_ply_file_and_prints_the_report(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_makes_a_ply_file_and_prints_the_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     asset = tmp_path / "car.ply"
     assert main([str(SEDAN), str(asset), "--views", ",".join(INPUTS)]) == 0
     report = json.loads(capsys.readouterr().out)

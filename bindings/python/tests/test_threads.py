@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import SEDAN, Views, same_bytes
 
 import vehicle_gaussians as vg
+from conftest import SEDAN, Views, same_bytes
 
 
 class Ticks:
@@ -53,9 +53,7 @@ def test_other_threads_run_while_the_library_works(sedan: vg.Scene, sedan_made: 
     assert during > 20
 
 
-def test_threads_share_one_model_and_reconstruct_side_by_side(
-    ellipsoid: Views, made: vg.Reconstruction
-) -> None:
+def test_threads_share_one_model_and_reconstruct_side_by_side(ellipsoid: Views, made: vg.Reconstruction) -> None:
     def job(i: int) -> tuple[bytes, vg.Gaussians]:
         own = vg.reconstruct(ellipsoid.images, ellipsoid.masks, ellipsoid.cameras, ellipsoid.depths)
         return made.gaussians.render(ellipsoid.cameras[i % 4]).tobytes(), own.gaussians
@@ -113,9 +111,7 @@ print("ready", flush=True)
 while True:
     vg.reconstruct(scene.images, scene.masks, scene.cameras, threads=1)
 """
-    child = subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     with child:
         assert child.stdout is not None and child.stdout.readline() == "ready\n"
         time.sleep(0.2)

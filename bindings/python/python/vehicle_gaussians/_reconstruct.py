@@ -59,14 +59,15 @@ def reconstruct(
 
     images: RGB, uint8 (height, width, 3); with a fourth channel, alpha is the mask where none is given.
     masks: (height, width), bool or uint8 where 128 and above is vehicle; None where nobody said.
-    cameras: one per image, posed in the vehicle's frame (x forward, y left, z up, metres; y = 0 is the plane of symmetry).
+    cameras: one per image, posed in the vehicle's frame (x forward, y left, z up, metres; y = 0 is the plane of
+    symmetry).
     depths: float32 (height, width), metres along the optical axis, 0 for none.
     prior: "given" takes the depths, "hull" the silhouettes, "auto" the depths if every used view has them.
     symmetry: mirror what no view observed ("auto"), all of the denser side ("always"), or nothing ("never").
     vehicle_size: length, width, height in metres, where known.
     sh_degree: highest degree of the colour, 0 to 3.
-    keep: what may not be left out as not needed: "duplicate-views", "overlap", "silhouette-edge", "floaters", "sh-bands",
-    or "all".
+    keep: what may not be left out as not needed: "duplicate-views", "overlap", "silhouette-edge", "floaters",
+    "sh-bands", or "all".
     check: draw the model into its input views for the report.
     points: return the point cloud as well.
     threads: worker threads; 0 means one per core. The result is the same with any number.

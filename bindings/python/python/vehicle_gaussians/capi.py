@@ -15,15 +15,19 @@ are declared on ``library``; structures, fields and enumerators have the header'
 
 from __future__ import annotations
 
+import contextlib
 import ctypes as ct
 import enum
 import json
 import os
+import signal
 import sys
+import threading
 import warnings
 import weakref
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from types import FrameType
 from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
@@ -241,8 +245,13 @@ class vg_scene_options(ct.Structure):
     )
 
 
-_handle, _out, _numbers = ct.c_void_p, ct.POINTER(ct.c_void_p), ct.c_void_p
-_size, _text, _u32, _i32 = ct.c_size_t, ct.c_char_p, ct.c_uint32, ct.c_int32
+_handle: Any = ct.c_void_p
+_out: Any = ct.POINTER(ct.c_void_p)
+_numbers: Any = ct.c_void_p
+_size: Any = ct.c_size_t
+_text: Any = ct.c_char_p
+_u32: Any = ct.c_uint32
+_i32: Any = ct.c_int32
 
 
 def _pointer(structure: type[ct.Structure]) -> Any:
@@ -556,7 +565,13 @@ class Gaussians:
         degree = {1: 0, 4: 1, 9: 2, 16: 3}.get(coefficients, -1)
         arrays = _initial(vg_gaussian_arrays)
         alive = []
-        shapes = {"positions": (n, 3), "scales": (n, 3), "rotations": (n, 4), "opacities": (n,), "sh": (n, coefficients, 3)}
+        shapes = {
+            "positions": (n, 3),
+            "scales": (n, 3),
+            "rotations": (n, 4),
+            "opacities": (n,),
+            "sh": (n, coefficients, 3),
+        }
         for (field, shape), array in zip(shapes.items(), (means, scales, quats, opacities, sh), strict=True):
             _expect(array, field, np.float32)
             if array.shape != shape:
@@ -756,23 +771,23 @@ def reconstruct(
     options.vehicle_size[:] = (0, 0, 0) if vehicle_size is None else vehicle_size
     raised: list[BaseException] = []
 
-    # Always there, so that Ctrl-C finds Python code to stop.
     def on_progress(stage: bytes, fraction: float, _: object) -> int:
         try:
-            return int(progress is not None and bool(progress(stage.decode(), fraction)))
+            return int(bool(raised) or (progress is not None and bool(progress(stage.decode(), fraction))))
         except BaseException as error:
             raised.append(error)
             return 1
 
+    # Always there: between two calls of it Python cannot see Ctrl-C.
     options.progress = ProgressFn(on_progress)
     options.log = LogFn(_logger(log, raised)) if log is not None else LogFn()
     car, report = ct.c_void_p(), ct.c_void_p()
     try:
-        _call("vg_reconstruct", views, n, ct.byref(options), ct.byref(car), ct.byref(report))
+        with _signals_kept(raised):
+            _call("vg_reconstruct", views, n, ct.byref(options), ct.byref(car), ct.byref(report))
     except VgError:
-        if raised:
-            raise raised[0] from None
-        raise
+        if not raised:
+            raise
     gaussians, told = Gaussians(_Handle("gaussians", car)), _Handle("report", report)
     if raised:
         raise raised[0]
@@ -784,6 +799,27 @@ def reconstruct(
             told.array(library.vg_report_point_colors(told), (count, 3), np.uint8),
         )
     return Reconstruction(gaussians, json.loads(library.vg_report_json(told)), cloud)
+
+
+@contextlib.contextmanager
+def _signals_kept(raised: list[BaseException]) -> Iterator[None]:
+    """Keeps what the handler of Ctrl-C raises: in a callback, ctypes would print it and forget it."""
+    usual = signal.getsignal(signal.SIGINT)
+    if not callable(usual) or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def keep(number: int, frame: FrameType | None) -> None:
+        try:
+            usual(number, frame)
+        except BaseException as error:
+            raised.append(error)
+
+    signal.signal(signal.SIGINT, keep)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
 
 
 def _logger(
@@ -828,9 +864,7 @@ def _mask(array: npt.NDArray[Any], argument: str, alive: list[Any]) -> vg_image:
     return _plane(array, argument, np.uint8, Format.GRAY8, alive)
 
 
-def _plane(
-    array: npt.NDArray[Any], argument: str, dtype: npt.DTypeLike, format: Format, alive: list[Any]
-) -> vg_image:
+def _plane(array: npt.NDArray[Any], argument: str, dtype: npt.DTypeLike, format: Format, alive: list[Any]) -> vg_image:
     _expect(array, argument, dtype)
     if array.ndim != 2:
         raise VgError(Status.ARGUMENT, f"{argument}: shape {array.shape}; allowed: (height, width)")
