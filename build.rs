@@ -5,7 +5,9 @@ fn main() {
     let os = std::env::var("CARGO_CFG_TARGET_OS").unwrap_or_default();
     match os.as_str() {
         "linux" | "android" | "freebsd" | "netbsd" | "openbsd" => {
-            println!("cargo::rustc-cdylib-link-arg=-Wl,-soname,libvg.so.0");
+            // Not `rustc-cdylib-link-arg`: that one is passed on to the shared objects of crates that use this one, and
+            // they would be called libvg.so.0 too.
+            println!("cargo::rustc-link-arg=-Wl,-soname,libvg.so.0");
         }
         "macos" => println!("cargo::rustc-cdylib-link-arg=-Wl,-install_name,@rpath/libvg.0.dylib"),
         _ => {}

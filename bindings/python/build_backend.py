@@ -1,0 +1,118 @@
+"""Build backend (PEP 517): maturin, after the C library has been put into the package.
+
+A wheel holds two faces of one library: the extension module ``_native``, and ``lib/libvg.so`` with ``include/vg.h``
+for ctypes and for C. ``python build_backend.py`` alone prepares a checkout for ``maturin develop``.
+
+There is no source distribution: the sources are those of the repository that this folder is a part of.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+PACKAGE = HERE / "python" / "vehicle_gaussians"
+LICENCES = ("LICENSE-MIT", "LICENSE-APACHE")
+
+
+def prepare() -> None:
+    """Puts the shared library, the header and the licences where maturin takes them from."""
+    check_checkout()
+    library = build_library()
+    fill(PACKAGE / "lib", [library])
+    fill(PACKAGE / "include", [ROOT / "include" / "vg.h"])
+
+
+def check_checkout() -> None:
+    """The library's sources are above this folder, and of the same version; copies the licences."""
+    if not (ROOT / "Cargo.toml").is_file():
+        sys.exit(
+            f"vehicle-gaussians: {ROOT} holds no Cargo.toml: build from a checkout of the whole repository, "
+            "with `pip install ./bindings/python`"
+        )
+    ours, theirs = (tomllib.loads((d / "Cargo.toml").read_text())["package"]["version"] for d in (HERE, ROOT))
+    if ours != theirs:
+        sys.exit(f"vehicle-gaussians: {HERE / 'Cargo.toml'} says {ours}, the library {theirs}; allowed: the same")
+    for licence in LICENCES:
+        shutil.copyfile(ROOT / licence, HERE / licence)
+
+
+def build_library() -> Path:
+    """The shared library with the C functions, built with the dependencies and settings of the extension module."""
+    cargo = shutil.which("cargo")
+    if cargo is None:
+        sys.exit("vehicle-gaussians: cargo is not on PATH: install Rust 1.89 or newer")
+    command = [cargo, "build", "--release", "--locked", "--package", "vehicle-gaussians", "--lib"]
+    command += ["--manifest-path", str(HERE / "Cargo.toml"), "--message-format", "json-render-diagnostics"]
+    print("Running `" + " ".join(command) + "`", flush=True)
+    built = subprocess.run(command, stdout=subprocess.PIPE, check=False, text=True)
+    if built.returncode != 0:
+        sys.exit(f"vehicle-gaussians: cargo ended with exit code {built.returncode}")
+    for message in map(json.loads, built.stdout.splitlines()):
+        if message["reason"] == "compiler-artifact" and message["target"]["name"] == "vg":
+            for file in map(Path, message["filenames"]):
+                if file.suffix in (".so", ".dylib", ".dll"):
+                    return file
+    sys.exit("vehicle-gaussians: cargo built no shared library")
+
+
+def fill(folder: Path, files: list[Path]) -> None:
+    """Makes `folder` hold these files and no others."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    for file in files:
+        shutil.copyfile(file, folder / file.name)
+
+
+def maturin() -> Any:
+    import maturin  # only there while a build runs
+
+    return maturin
+
+
+def build_wheel(wheel_directory: str, config_settings: Any = None, metadata_directory: str | None = None) -> str:
+    prepare()
+    return str(maturin().build_wheel(wheel_directory, config_settings, metadata_directory))
+
+
+def build_editable(wheel_directory: str, config_settings: Any = None, metadata_directory: str | None = None) -> str:
+    prepare()
+    return str(maturin().build_editable(wheel_directory, config_settings, metadata_directory))
+
+
+def build_sdist(sdist_directory: str, config_settings: Any = None) -> str:
+    sys.exit(
+        "vehicle-gaussians: there is no source distribution: build a wheel from a checkout of the whole "
+        "repository, with `pip wheel ./bindings/python` or `python -m build --wheel bindings/python`"
+    )
+
+
+def prepare_metadata_for_build_wheel(metadata_directory: str, config_settings: Any = None) -> str:
+    check_checkout()
+    return str(maturin().prepare_metadata_for_build_wheel(metadata_directory, config_settings))
+
+
+def prepare_metadata_for_build_editable(metadata_directory: str, config_settings: Any = None) -> str:
+    check_checkout()
+    return str(maturin().prepare_metadata_for_build_editable(metadata_directory, config_settings))
+
+
+def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
+    return []
+
+
+def get_requires_for_build_editable(config_settings: Any = None) -> list[str]:
+    return []
+
+
+if __name__ == "__main__":
+    os.chdir(HERE)
+    prepare()

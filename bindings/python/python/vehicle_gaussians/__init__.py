@@ -1,0 +1,42 @@
+"""A few photographs of one side of a vehicle in, a complete metric 3D Gaussian model of it out.
+
+>>> import vehicle_gaussians as vg
+>>> scene = vg.open_scene("my-car")
+>>> made = vg.reconstruct(scene.images, scene.masks, scene.cameras, scene.depths)
+>>> made.gaussians.save_ply("car.ply")
+>>> picture = made.gaussians.render(scene.cameras[0])
+
+Conventions: the vehicle's frame is x forward, y left, z up in metres, with the plane of symmetry y = 0. A camera's
+axes are x right, y down, z forward; the centre of the top-left pixel is (0.5, 0.5). Transforms are named to_from.
+Quaternions are (w, x, y, z). Pictures are RGB, row 0 at the top.
+"""
+
+from ._errors import Status, VgError
+from ._native import (
+    Camera,
+    Gaussians,
+    __version__,
+    pose_from_box,
+    pose_from_colmap,
+    pose_from_opengl,
+    similarity_from_points,
+)
+from ._reconstruct import Points, Reconstruction, reconstruct
+from ._scene import Scene, open_scene
+
+__all__ = [
+    "Camera",
+    "Gaussians",
+    "Points",
+    "Reconstruction",
+    "Scene",
+    "Status",
+    "VgError",
+    "__version__",
+    "open_scene",
+    "pose_from_box",
+    "pose_from_colmap",
+    "pose_from_opengl",
+    "reconstruct",
+    "similarity_from_points",
+]

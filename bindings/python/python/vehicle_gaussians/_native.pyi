@@ -1,0 +1,198 @@
+from collections.abc import Callable, Sequence
+from os import PathLike
+from typing import Literal, final, overload
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = [
+    "Camera",
+    "Gaussians",
+    "__version__",
+    "_panic_on_a_worker_thread",
+    "open_scene",
+    "pose_from_box",
+    "pose_from_colmap",
+    "pose_from_opengl",
+    "reconstruct",
+    "similarity_from_points",
+]
+
+__version__: str
+
+@final
+class Camera:
+    @staticmethod
+    def from_colmap(
+        model: str | int,
+        width: int,
+        height: int,
+        params: npt.ArrayLike,
+        vehicle_from_camera: npt.ArrayLike,
+    ) -> Camera: ...
+    @staticmethod
+    def from_matrix(
+        K: npt.ArrayLike,
+        vehicle_from_camera: npt.ArrayLike,
+        width: int,
+        height: int,
+        distortion: npt.ArrayLike | None = None,
+    ) -> Camera: ...
+    @staticmethod
+    def from_opencv(
+        K: npt.ArrayLike,
+        vehicle_from_camera: npt.ArrayLike,
+        width: int,
+        height: int,
+        distortion: npt.ArrayLike | None = None,
+        *,
+        fisheye: bool = False,
+    ) -> Camera: ...
+    def scaled(self, width: int, height: int) -> Camera: ...
+    def cropped(self, x: int, y: int, width: int, height: int) -> Camera: ...
+    def with_pose(self, vehicle_from_camera: npt.ArrayLike) -> Camera: ...
+    @property
+    def width(self) -> int: ...
+    @property
+    def height(self) -> int: ...
+    @property
+    def K(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def vehicle_from_camera(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def model(self) -> str: ...
+    @property
+    def params(self) -> npt.NDArray[np.float64]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+
+@final
+class Gaussians:
+    @staticmethod
+    def from_arrays(
+        means: npt.NDArray[np.float32],
+        scales: npt.NDArray[np.float32],
+        quats: npt.NDArray[np.float32],
+        opacities: npt.NDArray[np.float32],
+        sh: npt.NDArray[np.float32],
+    ) -> Gaussians: ...
+    @staticmethod
+    def load_ply(path: str | PathLike[str]) -> Gaussians: ...
+    def save_ply(self, path: str | PathLike[str]) -> None: ...
+    def mirrored(self) -> Gaussians: ...
+    def transformed(self, to_from_vehicle: npt.ArrayLike) -> Gaussians: ...
+    def merged(self, other: Gaussians) -> Gaussians: ...
+    @overload
+    def render(
+        self,
+        camera: Camera,
+        background: str | npt.ArrayLike = "white",
+        depth: Literal[False] = False,
+        threads: int = 0,
+        *,
+        dtype: Literal["uint8"] | type[np.uint8] = "uint8",
+        antialiased: bool = False,
+        near: float = 0.01,
+        far: float = 1e10,
+        sh_degree: int = 3,
+    ) -> npt.NDArray[np.uint8]: ...
+    @overload
+    def render(
+        self,
+        camera: Camera,
+        background: str | npt.ArrayLike = "white",
+        depth: Literal[False] = False,
+        threads: int = 0,
+        *,
+        dtype: Literal["float32"] | type[np.float32],
+        antialiased: bool = False,
+        near: float = 0.01,
+        far: float = 1e10,
+        sh_degree: int = 3,
+    ) -> npt.NDArray[np.float32]: ...
+    @overload
+    def render(
+        self,
+        camera: Camera,
+        background: str | npt.ArrayLike = "white",
+        *,
+        depth: Literal[True],
+        threads: int = 0,
+        dtype: Literal["uint8"] | type[np.uint8] = "uint8",
+        antialiased: bool = False,
+        near: float = 0.01,
+        far: float = 1e10,
+        sh_degree: int = 3,
+    ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]: ...
+    @overload
+    def render(
+        self,
+        camera: Camera,
+        background: str | npt.ArrayLike = "white",
+        *,
+        depth: Literal[True],
+        threads: int = 0,
+        dtype: Literal["float32"] | type[np.float32],
+        antialiased: bool = False,
+        near: float = 0.01,
+        far: float = 1e10,
+        sh_degree: int = 3,
+    ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]: ...
+    @property
+    def means(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def scales(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def quats(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def opacities(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def sh(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def sh_degree(self) -> int: ...
+    @property
+    def bounds(self) -> npt.NDArray[np.float32] | None: ...
+    def __len__(self) -> int: ...
+
+def pose_from_colmap(
+    qvec: npt.ArrayLike,
+    tvec: npt.ArrayLike,
+    vehicle_from_world: npt.ArrayLike | None = None,
+) -> npt.NDArray[np.float64]: ...
+def pose_from_opengl(
+    camera_to_world: npt.ArrayLike,
+    vehicle_from_world: npt.ArrayLike | None = None,
+) -> npt.NDArray[np.float64]: ...
+def pose_from_box(ego_from_vehicle: npt.ArrayLike, ego_from_camera: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
+def similarity_from_points(source: npt.ArrayLike, target: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
+def reconstruct(
+    images: Sequence[object],
+    masks: Sequence[object] | None,
+    cameras: Sequence[Camera],
+    depths: Sequence[object] | None,
+    *,
+    prior: str,
+    symmetry: str,
+    vehicle_size: Sequence[float] | None,
+    sh_degree: int,
+    keep: Sequence[str],
+    check: bool,
+    points: bool,
+    threads: int,
+    names: Sequence[str] | None,
+    progress: Callable[[str, float], object] | None,
+) -> tuple[Gaussians, str, tuple[npt.NDArray[np.float32], npt.NDArray[np.uint8]] | None]: ...
+def open_scene(
+    path: str | PathLike[str],
+    views: Sequence[str] | None,
+    vehicle_from_world: npt.ArrayLike | str | PathLike[str] | None,
+    depth_scale: float | None,
+    load_depth: bool,
+) -> tuple[
+    list[npt.NDArray[np.uint8]],
+    list[npt.NDArray[np.bool_] | None],
+    list[npt.NDArray[np.float32] | None],
+    list[Camera],
+    list[str],
+]: ...
+def _panic_on_a_worker_thread() -> None: ...

@@ -1,0 +1,94 @@
+"""Photographs in memory to a vehicle."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _native
+from ._native import Camera, Gaussians
+
+#: Masks are bool, or uint8 where 128 and above is vehicle.
+Mask: TypeAlias = npt.NDArray[np.bool_] | npt.NDArray[np.uint8]
+
+
+class Points(NamedTuple):
+    """The metric coloured point cloud: a point for every vehicle pixel with depth."""
+
+    #: Metres, vehicle frame; float32 (n, 3).
+    positions: npt.NDArray[np.float32]
+    #: sRGB; uint8 (n, 3).
+    colors: npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """A finished reconstruction."""
+
+    #: The vehicle.
+    gaussians: Gaussians
+    #: What was done, how long it took, what was left out and why.
+    report: dict[str, Any]
+    #: The point cloud, if asked for.
+    points: Points | None
+
+
+def reconstruct(
+    images: Iterable[npt.NDArray[np.uint8]],
+    masks: Iterable[Mask | None] | None,
+    cameras: Iterable[Camera],
+    depths: Iterable[npt.NDArray[np.float32] | None] | None = None,
+    *,
+    prior: Literal["auto", "given", "hull"] = "auto",
+    symmetry: Literal["auto", "always", "never"] = "auto",
+    vehicle_size: tuple[float, float, float] | None = None,
+    sh_degree: int = 2,
+    keep: str | Iterable[str] = (),
+    check: bool = True,
+    points: bool = False,
+    threads: int = 0,
+    names: Iterable[str] | None = None,
+    progress: Callable[[str, float], object] | None = None,
+) -> Reconstruction:
+    """Reconstructs the vehicle that the photographs show.
+
+    images: RGB, uint8 (height, width, 3); with a fourth channel, alpha is the mask where none is given.
+    masks: (height, width), bool or uint8 where 128 and above is vehicle; None where nobody said.
+    cameras: one per image, posed in the vehicle's frame (x forward, y left, z up, metres; y = 0 is the plane of
+    symmetry).
+    depths: float32 (height, width), metres along the optical axis, 0 for none.
+    prior: "given" takes the depths, "hull" the silhouettes, "auto" the depths if every used view has them.
+    symmetry: mirror what no view observed ("auto"), all of the denser side ("always"), or nothing ("never").
+    vehicle_size: length, width, height in metres, where known.
+    sh_degree: highest degree of the colour, 0 to 3.
+    keep: what may not be left out as not needed: "duplicate-views", "overlap", "silhouette-edge", "floaters",
+    "sh-bands", or "all".
+    check: draw the model into its input views for the report.
+    points: return the point cloud as well.
+    threads: worker threads; 0 means one per core. The result is the same with any number.
+    names: of the views, for messages and the report.
+    progress: called as progress(stage, fraction) on this thread; a true return value cancels (a VgError with code
+    CANCELLED), an exception passes through. Ctrl-C raises KeyboardInterrupt at the next call.
+    """
+    gaussians, report, cloud = _native.reconstruct(
+        list(images),
+        None if masks is None else list(masks),
+        list(cameras),
+        None if depths is None else list(depths),
+        prior=prior,
+        symmetry=symmetry,
+        vehicle_size=None if vehicle_size is None else list(vehicle_size),
+        sh_degree=sh_degree,
+        keep=[keep] if isinstance(keep, str) else list(keep),
+        check=check,
+        points=points,
+        threads=threads,
+        names=None if names is None else list(names),
+        progress=progress,
+    )
+    return Reconstruction(gaussians, json.loads(report), None if cloud is None else Points(*cloud))

@@ -1,0 +1,51 @@
+"""Scenes on disk."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _native
+from ._native import Camera
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Views of one vehicle, a list entry each, as ``reconstruct`` takes them."""
+
+    #: RGB, uint8 (height, width, 3).
+    images: list[npt.NDArray[np.uint8]]
+    #: True is vehicle, (height, width); None where there is no mask.
+    masks: list[npt.NDArray[np.bool_] | None]
+    #: Metres along the optical axis, 0 for none, float32 (height, width); None where there is no depth map.
+    depths: list[npt.NDArray[np.float32] | None]
+    #: Posed in the vehicle's frame.
+    cameras: list[Camera]
+    #: The pictures' paths below their images folder.
+    names: list[str]
+
+
+def open_scene(
+    path: str | os.PathLike[str],
+    views: str | Iterable[str] | None = None,
+    vehicle_from_world: npt.ArrayLike | str | os.PathLike[str] | None = None,
+    *,
+    depth_scale: float | None = None,
+    load_depth: bool = True,
+) -> Scene:
+    """Opens a scene: a ``transforms.json`` in nerfstudio's format, a folder with one, or a COLMAP folder.
+
+    views: the views wanted, in this order, by path, file name, or file name without extension; all if not given.
+    vehicle_from_world: the similarity from the scene's world to the vehicle's frame, as a 4x4 matrix or the JSON file
+    that holds one. A COLMAP model needs it; a transforms.json is taken to be in the vehicle's frame without.
+    depth_scale: metres per number in the depth files, instead of what the scene says.
+
+    What is legal but looks like a mistake is a warning.
+    """
+    if views is not None:
+        views = [views] if isinstance(views, str) else list(views)
+    return Scene(*_native.open_scene(path, views, vehicle_from_world, depth_scale, load_depth))

@@ -1,0 +1,938 @@
+"""The library through ctypes alone: the C interface of ``include/vg.h``, and thin functions over it.
+
+For environments that load shared libraries but no extension modules, for other versions of the library, and as the
+model of a binding in any language. It gives the same bytes as the package itself.
+
+>>> from vehicle_gaussians import capi
+>>> scene = capi.open_scene("my-car")
+>>> car = capi.reconstruct(scene.images, scene.masks, scene.cameras, scene.depths).gaussians
+>>> car.save_ply("car.ply")
+>>> picture = car.render(scene.cameras[0])
+
+The package's own libvg is used, or the one that the environment variable VG_LIBRARY names. All functions of the header
+are declared on ``library``; structures, fields and enumerators have the header's names.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes as ct
+import enum
+import json
+import os
+import signal
+import sys
+import threading
+import warnings
+import weakref
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from types import FrameType
+from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from ._errors import Status, VgError
+
+#: The binary interface that this module is written for.
+ABI_VERSION = 0
+
+
+class Format(enum.IntEnum):
+    """vg_format"""
+
+    RGB8, BGR8, RGBA8, BGRA8, GRAY8, RGBA32F, DEPTH32F = range(1, 8)
+
+
+class CameraModel(enum.IntEnum):
+    """vg_camera_model"""
+
+    SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, OPENCV_FISHEYE, FULL_OPENCV = range(7)
+
+
+class Prior(enum.IntEnum):
+    """vg_prior"""
+
+    AUTO, GIVEN, HULL, ONNX = range(4)
+
+
+class Symmetry(enum.IntEnum):
+    """vg_symmetry"""
+
+    AUTO, ALWAYS, NEVER = range(3)
+
+
+class Keep(enum.IntFlag):
+    """vg_keep"""
+
+    DUPLICATE_VIEWS, OVERLAP, SILHOUETTE_EDGE, FLOATERS, SH_BANDS = 1, 2, 4, 8, 16
+
+
+class LogLevel(enum.IntEnum):
+    """vg_log_level"""
+
+    WARNING, INFO, DEBUG = range(1, 4)
+
+
+class Backend(enum.IntEnum):
+    """vg_backend"""
+
+    AUTO, CPU, GPU = range(3)
+
+
+class Background(enum.IntEnum):
+    """vg_background"""
+
+    COLOR, TRANSPARENT = range(2)
+
+
+class Alpha(enum.IntEnum):
+    """vg_alpha"""
+
+    STRAIGHT, PREMULTIPLIED = range(2)
+
+
+class DepthMode(enum.IntEnum):
+    """vg_depth_mode"""
+
+    EXPECTED, ACCUMULATED = range(2)
+
+
+#: vg_progress_fn
+ProgressFn = ct.CFUNCTYPE(ct.c_int32, ct.c_char_p, ct.c_double, ct.c_void_p)
+#: vg_log_fn
+LogFn = ct.CFUNCTYPE(None, ct.c_int32, ct.c_char_p, ct.c_void_p)
+
+
+class vg_context_options(ct.Structure):
+    _fields_ = (("struct_size", ct.c_size_t), ("threads", ct.c_uint32), ("flags", ct.c_uint32))
+
+
+class vg_camera(ct.Structure):
+    _fields_ = (
+        ("struct_size", ct.c_size_t),
+        ("width", ct.c_uint32),
+        ("height", ct.c_uint32),
+        ("model", ct.c_int32),
+        ("flags", ct.c_uint32),
+        ("params", ct.c_double * 16),
+        ("vehicle_from_camera", ct.c_double * 12),
+        ("reserved", ct.c_uint64 * 4),
+    )
+
+
+class vg_image(ct.Structure):
+    _fields_ = (
+        ("data", ct.c_void_p),
+        ("row_stride", ct.c_size_t),
+        ("width", ct.c_uint32),
+        ("height", ct.c_uint32),
+        ("format", ct.c_int32),
+        ("flags", ct.c_uint32),
+    )
+
+
+class vg_view(ct.Structure):
+    _fields_ = (
+        ("struct_size", ct.c_size_t),
+        ("name", ct.c_char_p),
+        ("camera", vg_camera),
+        ("image", vg_image),
+        ("mask", vg_image),
+        ("depth", vg_image),
+    )
+
+
+class vg_options(ct.Structure):
+    _fields_ = (
+        ("struct_size", ct.c_size_t),
+        ("context", ct.c_void_p),
+        ("prior", ct.c_int32),
+        ("symmetry", ct.c_int32),
+        ("sh_degree", ct.c_int32),
+        ("keep", ct.c_uint32),
+        ("check", ct.c_int32),
+        ("points", ct.c_int32),
+        ("vehicle_size", ct.c_double * 3),
+        ("progress", ProgressFn),
+        ("progress_user", ct.c_void_p),
+        ("log", LogFn),
+        ("log_user", ct.c_void_p),
+    )
+
+
+class vg_report_figures(ct.Structure):
+    _fields_ = (
+        ("struct_size", ct.c_size_t),
+        ("gaussian_count", ct.c_uint64),
+        ("mirrored_count", ct.c_uint64),
+        ("views_used", ct.c_uint32),
+        ("threads", ct.c_uint32),
+        ("prior", ct.c_int32),
+        ("sh_degree", ct.c_int32),
+        ("total_ms", ct.c_double),
+        ("peak_rss_bytes", ct.c_uint64),
+        ("has_input_error", ct.c_int32),
+        ("has_box", ct.c_int32),
+        ("input_psnr_db", ct.c_double),
+        ("input_silhouette_iou", ct.c_double),
+        ("box_size", ct.c_double * 3),
+        ("extent_low", ct.c_double * 3),
+        ("extent_high", ct.c_double * 3),
+    )
+
+
+class vg_gaussian_arrays(ct.Structure):
+    _fields_ = (
+        ("struct_size", ct.c_size_t),
+        ("count", ct.c_size_t),
+        ("positions", ct.c_void_p),
+        ("scales", ct.c_void_p),
+        ("rotations", ct.c_void_p),
+        ("opacities", ct.c_void_p),
+        ("sh", ct.c_void_p),
+        ("sh_degree", ct.c_int32),
+        ("flags", ct.c_uint32),
+    )
+
+
+class vg_render_options(ct.Structure):
+    _fields_ = (
+        ("struct_size", ct.c_size_t),
+        ("context", ct.c_void_p),
+        ("backend", ct.c_int32),
+        ("background", ct.c_int32),
+        ("background_color", ct.c_float * 3),
+        ("alpha", ct.c_int32),
+        ("depth_mode", ct.c_int32),
+        ("sh_degree", ct.c_int32),
+        ("antialiased", ct.c_int32),
+        ("blur", ct.c_float),
+        ("near_plane", ct.c_float),
+        ("far_plane", ct.c_float),
+        ("max_alpha", ct.c_float),
+        ("flags", ct.c_uint32),
+    )
+
+
+class vg_image_target(ct.Structure):
+    _fields_ = (
+        ("struct_size", ct.c_size_t),
+        ("width", ct.c_uint32),
+        ("height", ct.c_uint32),
+        ("color", ct.c_void_p),
+        ("color_row_stride", ct.c_size_t),
+        ("depth", ct.c_void_p),
+        ("depth_row_stride", ct.c_size_t),
+        ("color_format", ct.c_int32),
+        ("flags", ct.c_uint32),
+    )
+
+
+class vg_scene_options(ct.Structure):
+    _fields_ = (
+        ("struct_size", ct.c_size_t),
+        ("context", ct.c_void_p),
+        ("vehicle_from_world", ct.c_void_p),
+        ("names", ct.POINTER(ct.c_char_p)),
+        ("name_count", ct.c_size_t),
+        ("depth_scale", ct.c_double),
+        ("load_depth", ct.c_int32),
+        ("flags", ct.c_uint32),
+        ("log", LogFn),
+        ("log_user", ct.c_void_p),
+    )
+
+
+_handle: Any = ct.c_void_p
+_out: Any = ct.POINTER(ct.c_void_p)
+_numbers: Any = ct.c_void_p
+_size: Any = ct.c_size_t
+_text: Any = ct.c_char_p
+_u32: Any = ct.c_uint32
+_i32: Any = ct.c_int32
+
+
+def _pointer(structure: type[ct.Structure]) -> Any:
+    return ct.POINTER(structure)
+
+
+#: Result and arguments of every function of the header; handles and arrays are void pointers here.
+PROTOTYPES: Mapping[str, tuple[Any, tuple[Any, ...]]] = {
+    "vg_version": (_text, ()),
+    "vg_abi_version": (_u32, ()),
+    "vg_error_code": (_i32, (_handle,)),
+    "vg_error_message": (_text, (_handle,)),
+    "vg_error_free": (None, (_handle,)),
+    "vg_context_options_init": (_i32, (_pointer(vg_context_options), _size)),
+    "vg_context_new": (_i32, (_pointer(vg_context_options), _out, _out)),
+    "vg_context_threads": (_u32, (_handle,)),
+    "vg_context_free": (None, (_handle,)),
+    "vg_camera_init": (_i32, (_pointer(vg_camera), _size)),
+    "vg_camera_from_colmap_model": (_i32, (_i32, _numbers, _size, _u32, _u32, _numbers, _pointer(vg_camera), _out)),
+    "vg_camera_from_opencv": (
+        _i32,
+        (_numbers, _numbers, _size, _i32, _u32, _u32, _numbers, _pointer(vg_camera), _out),
+    ),
+    "vg_camera_scale": (_i32, (_pointer(vg_camera), _u32, _u32, _pointer(vg_camera), _out)),
+    "vg_camera_crop": (_i32, (_pointer(vg_camera), _u32, _u32, _u32, _u32, _pointer(vg_camera), _out)),
+    "vg_pose_from_colmap": (_i32, (_numbers, _numbers, _numbers, _numbers, _out)),
+    "vg_pose_from_opengl": (_i32, (_numbers, _numbers, _numbers, _out)),
+    "vg_pose_from_box": (_i32, (_numbers, _numbers, _numbers, _out)),
+    "vg_camera_project": (_i32, (_pointer(vg_camera), _numbers, _numbers, _out)),
+    "vg_view_init": (_i32, (_pointer(vg_view), _size)),
+    "vg_options_init": (_i32, (_pointer(vg_options), _size)),
+    "vg_report_figures_init": (_i32, (_pointer(vg_report_figures), _size)),
+    "vg_report_get_figures": (_i32, (_handle, _pointer(vg_report_figures), _out)),
+    "vg_report_json": (_text, (_handle,)),
+    "vg_report_point_count": (_size, (_handle,)),
+    "vg_report_point_positions": (_numbers, (_handle,)),
+    "vg_report_point_colors": (_numbers, (_handle,)),
+    "vg_report_free": (None, (_handle,)),
+    "vg_gaussian_arrays_init": (_i32, (_pointer(vg_gaussian_arrays), _size)),
+    "vg_gaussians_count": (_size, (_handle,)),
+    "vg_gaussians_sh_degree": (_i32, (_handle,)),
+    "vg_gaussians_positions": (_numbers, (_handle,)),
+    "vg_gaussians_scales": (_numbers, (_handle,)),
+    "vg_gaussians_rotations": (_numbers, (_handle,)),
+    "vg_gaussians_opacities": (_numbers, (_handle,)),
+    "vg_gaussians_sh": (_numbers, (_handle,)),
+    "vg_gaussians_load_ply": (_i32, (_text, _out, _out)),
+    "vg_gaussians_save_ply": (_i32, (_handle, _text, _out)),
+    "vg_gaussians_from_arrays": (_i32, (_pointer(vg_gaussian_arrays), _out, _out)),
+    "vg_gaussians_transform": (_i32, (_handle, _numbers, _out, _out)),
+    "vg_gaussians_mirror": (_i32, (_handle, _out, _out)),
+    "vg_gaussians_merge": (_i32, (_handle, _handle, _out, _out)),
+    "vg_gaussians_free": (None, (_handle,)),
+    "vg_reconstruct": (_i32, (_pointer(vg_view), _size, _pointer(vg_options), _out, _out, _out)),
+    "vg_render_options_init": (_i32, (_pointer(vg_render_options), _size)),
+    "vg_image_target_init": (_i32, (_pointer(vg_image_target), _size)),
+    "vg_render": (
+        _i32,
+        (_handle, _pointer(vg_camera), _pointer(vg_render_options), _pointer(vg_image_target), _out),
+    ),
+    "vg_scene_options_init": (_i32, (_pointer(vg_scene_options), _size)),
+    "vg_colmap_open": (_i32, (_text, _pointer(vg_scene_options), _out, _out)),
+    "vg_transforms_open": (_i32, (_text, _pointer(vg_scene_options), _out, _out)),
+    "vg_scene_view_count": (_size, (_handle,)),
+    "vg_scene_get_view": (_i32, (_handle, _size, _pointer(vg_view), _out)),
+    "vg_scene_free": (None, (_handle,)),
+}
+
+
+def library_path() -> Path:
+    """The shared library: the one VG_LIBRARY names, else the package's own."""
+    override = os.environ.get("VG_LIBRARY")
+    if override:
+        return Path(override)
+    name = {"darwin": "libvg.dylib", "win32": "vg.dll"}.get(sys.platform, "libvg.so")
+    return Path(__file__).parent / "lib" / name
+
+
+def include_path() -> Path:
+    """The folder with vg.h, for compilers."""
+    return Path(__file__).parent / "include"
+
+
+def _load(path: Path) -> ct.CDLL:
+    hints = (
+        "Hints: install the package from a checkout of the repository (`pip install ./bindings/python`), which builds "
+        "the library and puts it there; or let the environment variable VG_LIBRARY name a libvg"
+    )
+    said = "VG_LIBRARY names it. " if os.environ.get("VG_LIBRARY") else ""
+    if not path.is_file():
+        raise ImportError(f"{path}: there is no such library. {said}{hints}")
+    try:
+        loaded = ct.CDLL(str(path))
+    except OSError as error:
+        raise ImportError(f"{path}: cannot be loaded: {error}. {said}{hints}") from error
+    missing = [name for name in PROTOTYPES if not hasattr(loaded, name)]
+    if "vg_abi_version" in missing:
+        raise ImportError(f"{path}: not a libvg: it has no vg_abi_version. {said}{hints}")
+    found = loaded.vg_abi_version()
+    if found != ABI_VERSION:
+        raise ImportError(f"{path}: has binary interface {found}; this module needs {ABI_VERSION}. {said}{hints}")
+    if missing:
+        raise ImportError(f"{path}: older than this module: it has no {', '.join(missing)}. {said}{hints}")
+    for name, (result, arguments) in PROTOTYPES.items():
+        function = getattr(loaded, name)
+        function.restype, function.argtypes = result, arguments
+    return loaded
+
+
+#: The loaded library, all functions of the header declared.
+library = _load(library_path())
+
+
+def version() -> str:
+    """Version of the library that is running."""
+    return _utf8(library.vg_version())
+
+
+def _utf8(text: bytes | None) -> str:
+    return (text or b"").decode("utf-8", "replace")
+
+
+def _call(name: str, *arguments: Any) -> None:
+    """Calls a function whose last argument is out_error; a failure is a VgError."""
+    error = ct.c_void_p()
+    status = getattr(library, name)(*arguments, ct.byref(error))
+    if status != Status.OK:
+        message = _utf8(library.vg_error_message(error))
+        library.vg_error_free(error)
+        raise VgError(status, message)
+
+
+def _initial(structure: type[ct.Structure]) -> Any:
+    """A structure with its default values."""
+    made = structure()
+    status = getattr(library, structure.__name__ + "_init")(ct.byref(made), ct.sizeof(made))
+    if status != Status.OK:
+        raise VgError(status, f"{structure.__name__}_init failed")
+    return made
+
+
+class _Handle:
+    """An object of the library, freed when nobody refers to it any more."""
+
+    def __init__(self, name: str, pointer: ct.c_void_p) -> None:
+        self._as_parameter_ = pointer.value
+        free = getattr(library, f"vg_{name}_free")
+        # At the end of the process the system takes the memory; arrays may still look at it.
+        weakref.finalize(self, free, pointer.value).atexit = False
+
+    def array(self, address: int | None, shape: tuple[int, ...], dtype: npt.DTypeLike) -> npt.NDArray[Any]:
+        """A read-only view of memory of this object, which it keeps alive."""
+        if not address:
+            return np.zeros(shape, dtype)
+        memory: Any = (ct.c_uint8 * (int(np.prod(shape)) * np.dtype(dtype).itemsize)).from_address(address)
+        memory.owner = self
+        return np.frombuffer(memoryview(memory).toreadonly(), dtype).reshape(shape)
+
+
+class Context(_Handle):
+    """Worker threads and memory for calls that follow each other; 0 threads means one per core."""
+
+    def __init__(self, threads: int = 0) -> None:
+        options = _initial(vg_context_options)
+        options.threads = threads
+        made = ct.c_void_p()
+        _call("vg_context_new", ct.byref(options), ct.byref(made))
+        super().__init__("context", made)
+
+    @property
+    def threads(self) -> int:
+        return int(library.vg_context_threads(self))
+
+
+class AnyCamera(Protocol):
+    """What vehicle_gaussians.Camera offers."""
+
+    @property
+    def model(self) -> str: ...
+    @property
+    def params(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def width(self) -> int: ...
+    @property
+    def height(self) -> int: ...
+    @property
+    def vehicle_from_camera(self) -> npt.NDArray[np.float64]: ...
+
+
+Camera: TypeAlias = vg_camera | AnyCamera
+
+
+def camera_from_colmap(
+    model: str | int, width: int, height: int, params: npt.ArrayLike, vehicle_from_camera: npt.ArrayLike
+) -> vg_camera:
+    """A camera of one of COLMAP's models; the pose is 3x4 or 4x4."""
+    number = CameraModel.__members__.get(model, -1) if isinstance(model, str) else model
+    values, pose, made = _doubles(params), _pose(vehicle_from_camera), vg_camera()
+    _call(
+        "vg_camera_from_colmap_model",
+        *(number, values.ctypes.data, values.size, width, height, pose.ctypes.data, ct.byref(made)),
+    )
+    return made
+
+
+def camera_from_opencv(
+    K: npt.ArrayLike,
+    vehicle_from_camera: npt.ArrayLike,
+    width: int,
+    height: int,
+    distortion: npt.ArrayLike = (),
+    *,
+    fisheye: bool = False,
+) -> vg_camera:
+    """A camera of OpenCV's calibration, which puts the centre of the top-left pixel at (0, 0)."""
+    k, bent, pose, made = _doubles(K, (3, 3)), _doubles(distortion), _pose(vehicle_from_camera), vg_camera()
+    _call(
+        "vg_camera_from_opencv",
+        *(k.ctypes.data, bent.ctypes.data, bent.size, fisheye, width, height, pose.ctypes.data, ct.byref(made)),
+    )
+    return made
+
+
+def pose_from_colmap(
+    qvec: npt.ArrayLike, tvec: npt.ArrayLike, vehicle_from_world: npt.ArrayLike | None = None
+) -> npt.NDArray[np.float64]:
+    """vehicle_from_camera (4x4) of COLMAP's world-to-camera quaternion (w, x, y, z) and translation."""
+    q, t, world = _doubles(qvec, (4,)), _doubles(tvec, (3,)), _optional_doubles(vehicle_from_world, (4, 4))
+    pose = np.eye(4)
+    _call("vg_pose_from_colmap", q.ctypes.data, t.ctypes.data, _address(world), pose.ctypes.data)
+    return pose
+
+
+def pose_from_opengl(
+    camera_to_world: npt.ArrayLike, vehicle_from_world: npt.ArrayLike | None = None
+) -> npt.NDArray[np.float64]:
+    """vehicle_from_camera (4x4) of a camera-to-world matrix with OpenGL's camera axes, as nerfstudio writes it."""
+    matrix, world = _pose(camera_to_world), _optional_doubles(vehicle_from_world, (4, 4))
+    pose = np.eye(4)
+    _call("vg_pose_from_opengl", matrix.ctypes.data, _address(world), pose.ctypes.data)
+    return pose
+
+
+def pose_from_box(ego_from_vehicle: npt.ArrayLike, ego_from_camera: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """vehicle_from_camera (4x4) of a tracked box and the camera in one frame."""
+    vehicle, camera, pose = _pose(ego_from_vehicle), _pose(ego_from_camera), np.eye(4)
+    _call("vg_pose_from_box", vehicle.ctypes.data, camera.ctypes.data, pose.ctypes.data)
+    return pose
+
+
+def _doubles(values: npt.ArrayLike, shape: tuple[int, ...] | None = None) -> npt.NDArray[np.float64]:
+    array = np.ascontiguousarray(values, dtype=np.float64)
+    if shape is not None and array.shape != shape:
+        raise VgError(Status.ARGUMENT, f"an array of shape {array.shape}; allowed: {shape}")
+    return array
+
+
+def _optional_doubles(values: npt.ArrayLike | None, shape: tuple[int, ...]) -> npt.NDArray[np.float64] | None:
+    return None if values is None else _doubles(values, shape)
+
+
+def _address(array: npt.NDArray[Any] | None) -> int | None:
+    return None if array is None else array.ctypes.data
+
+
+def _pose(matrix: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    array = _doubles(matrix)
+    if array.shape not in ((3, 4), (4, 4)) or (array.shape == (4, 4) and array[3].tolist() != [0, 0, 0, 1]):
+        raise VgError(Status.ARGUMENT, f"a pose of shape {array.shape}; allowed: 3x4, or 4x4 with last row 0 0 0 1")
+    return array
+
+
+def _camera(camera: Camera) -> vg_camera:
+    if isinstance(camera, vg_camera):
+        return camera
+    try:
+        members = (camera.model, camera.width, camera.height, camera.params, camera.vehicle_from_camera)
+    except AttributeError:
+        raise TypeError(f"camera: {type(camera).__name__}; allowed: a vg_camera, or a Camera") from None
+    return camera_from_colmap(*members)
+
+
+class Gaussians:
+    """The Gaussians of a vehicle. They do not change; arrays are read-only views that keep them alive."""
+
+    def __init__(self, handle: _Handle) -> None:
+        self._handle = handle
+
+    @classmethod
+    def _made_by(cls, name: str, *arguments: Any) -> Gaussians:
+        made = ct.c_void_p()
+        _call(name, *arguments, ct.byref(made))
+        return cls(_Handle("gaussians", made))
+
+    @classmethod
+    def load_ply(cls, path: str | os.PathLike[str]) -> Gaussians:
+        """Reads a PLY file in the layout of 3D Gaussian Splatting."""
+        return cls._made_by("vg_gaussians_load_ply", os.fsencode(path))
+
+    @classmethod
+    def from_arrays(
+        cls,
+        means: npt.NDArray[np.float32],
+        scales: npt.NDArray[np.float32],
+        quats: npt.NDArray[np.float32],
+        opacities: npt.NDArray[np.float32],
+        sh: npt.NDArray[np.float32],
+    ) -> Gaussians:
+        """Copies float32 arrays of shapes (n, 3), (n, 3), (n, 4), (n,) and (n, (degree + 1)^2, 3)."""
+        n, coefficients = len(means), sh.shape[1] if sh.ndim == 3 else -1
+        degree = {1: 0, 4: 1, 9: 2, 16: 3}.get(coefficients, -1)
+        arrays = _initial(vg_gaussian_arrays)
+        alive = []
+        shapes = {
+            "positions": (n, 3),
+            "scales": (n, 3),
+            "rotations": (n, 4),
+            "opacities": (n,),
+            "sh": (n, coefficients, 3),
+        }
+        for (field, shape), array in zip(shapes.items(), (means, scales, quats, opacities, sh), strict=True):
+            _expect(array, field, np.float32)
+            if array.shape != shape:
+                raise VgError(Status.ARGUMENT, f"{field}: shape {array.shape}; allowed: {shape}")
+            alive.append(np.ascontiguousarray(array))
+            setattr(arrays, field, alive[-1].ctypes.data)
+        arrays.count, arrays.sh_degree = n, degree
+        return cls._made_by("vg_gaussians_from_arrays", ct.byref(arrays))
+
+    def save_ply(self, path: str | os.PathLike[str]) -> None:
+        """Writes a PLY file in the layout of 3D Gaussian Splatting."""
+        _call("vg_gaussians_save_ply", self._handle, os.fsencode(path))
+
+    def mirrored(self) -> Gaussians:
+        """The mirror image across the plane of symmetry, y = 0."""
+        return self._made_by("vg_gaussians_mirror", self._handle)
+
+    def transformed(self, to_from_vehicle: npt.ArrayLike) -> Gaussians:
+        """These in another frame, moved by a 4x4 similarity."""
+        matrix = _doubles(to_from_vehicle, (4, 4))
+        return self._made_by("vg_gaussians_transform", self._handle, matrix.ctypes.data)
+
+    def merged(self, other: Gaussians) -> Gaussians:
+        """These, then those of other."""
+        return self._made_by("vg_gaussians_merge", self._handle, other._handle)
+
+    def render(
+        self,
+        camera: Camera,
+        background: str | Sequence[float] = "white",
+        *,
+        dtype: npt.DTypeLike = np.uint8,
+        antialiased: bool = False,
+        context: Context | None = None,
+    ) -> npt.NDArray[Any]:
+        """The picture a camera takes, RGB, or RGBA with straight alpha on a "transparent" background."""
+        return self._draw(camera, background, np.dtype(dtype), antialiased, context, with_depth=False)[0]
+
+    def render_with_depth(
+        self,
+        camera: Camera,
+        background: str | Sequence[float] = "white",
+        *,
+        dtype: npt.DTypeLike = np.uint8,
+        antialiased: bool = False,
+        context: Context | None = None,
+    ) -> tuple[npt.NDArray[Any], npt.NDArray[np.float32]]:
+        """The picture, and its depth in metres, 0 where there is nothing."""
+        picture, depth = self._draw(camera, background, np.dtype(dtype), antialiased, context, with_depth=True)
+        assert depth is not None
+        return picture, depth
+
+    def _draw(
+        self,
+        camera: Camera,
+        background: str | Sequence[float],
+        dtype: np.dtype[Any],
+        antialiased: bool,
+        context: Context | None,
+        with_depth: bool,
+    ) -> tuple[npt.NDArray[Any], npt.NDArray[np.float32] | None]:
+        posed = _camera(camera)
+        options, target = _initial(vg_render_options), _initial(vg_image_target)
+        options.context = None if context is None else context._as_parameter_
+        options.antialiased = antialiased
+        opaque = background != "transparent"
+        if opaque:
+            named: dict[Any, Sequence[float]] = {"white": (1, 1, 1), "black": (0, 0, 0)}
+            color = named.get(background, ()) if isinstance(background, str) else background
+            if len(color) != 3:
+                allowed = "white, black, transparent, or (r, g, b) from 0 to 1"
+                raise VgError(Status.ARGUMENT, f"background: {background!r}; allowed: {allowed}")
+            options.background_color[:] = color
+        else:
+            options.background = Background.TRANSPARENT
+        if dtype == np.uint8:
+            target.color_format, channels = (Format.RGB8, 3) if opaque else (Format.RGBA8, 4)
+        elif dtype == np.float32:
+            target.color_format, channels = Format.RGBA32F, 4
+        else:
+            raise TypeError(f"dtype: {dtype}; allowed: uint8 or float32")
+        size = (posed.height, posed.width)
+        picture = np.empty((*size, channels), dtype)
+        depth = np.empty(size, np.float32) if with_depth else None
+        target.width, target.height = posed.width, posed.height
+        target.color, target.depth = picture.ctypes.data, _address(depth)
+        _call("vg_render", self._handle, ct.byref(posed), ct.byref(options), ct.byref(target))
+        return (picture[..., :3] if opaque else picture), depth
+
+    def _array(self, name: str, *per_gaussian: int) -> npt.NDArray[np.float32]:
+        address = getattr(library, "vg_gaussians_" + name)(self._handle)
+        return self._handle.array(address, (len(self), *per_gaussian), np.float32)
+
+    @property
+    def means(self) -> npt.NDArray[np.float32]:
+        """Centres, metres. (n, 3)"""
+        return self._array("positions", 3)
+
+    @property
+    def scales(self) -> npt.NDArray[np.float32]:
+        """Standard deviations, metres. (n, 3)"""
+        return self._array("scales", 3)
+
+    @property
+    def quats(self) -> npt.NDArray[np.float32]:
+        """Unit quaternions (w, x, y, z). (n, 4)"""
+        return self._array("rotations", 4)
+
+    @property
+    def opacities(self) -> npt.NDArray[np.float32]:
+        """Peak opacities, 0 to 1. (n,)"""
+        return self._array("opacities")
+
+    @property
+    def sh(self) -> npt.NDArray[np.float32]:
+        """Spherical harmonics, RGB last. (n, (degree + 1)^2, 3)"""
+        return self._array("sh", (self.sh_degree + 1) ** 2, 3)
+
+    @property
+    def sh_degree(self) -> int:
+        """Highest degree of the spherical harmonics, 0 to 3."""
+        return int(library.vg_gaussians_sh_degree(self._handle))
+
+    def __len__(self) -> int:
+        return int(library.vg_gaussians_count(self._handle))
+
+    def __repr__(self) -> str:
+        return f"Gaussians({len(self)}, sh_degree={self.sh_degree})"
+
+
+class Points(NamedTuple):
+    """The metric coloured point cloud."""
+
+    #: Metres, float32 (n, 3).
+    positions: npt.NDArray[np.float32]
+    #: sRGB, uint8 (n, 3).
+    colors: npt.NDArray[np.uint8]
+
+
+class Reconstruction(NamedTuple):
+    """A finished reconstruction."""
+
+    gaussians: Gaussians
+    report: dict[str, Any]
+    points: Points | None
+
+
+def reconstruct(
+    images: Iterable[npt.NDArray[np.uint8]],
+    masks: Iterable[npt.NDArray[np.bool_] | npt.NDArray[np.uint8] | None] | None,
+    cameras: Iterable[Camera],
+    depths: Iterable[npt.NDArray[np.float32] | None] | None = None,
+    *,
+    prior: Literal["auto", "given", "hull"] = "auto",
+    symmetry: Literal["auto", "always", "never"] = "auto",
+    vehicle_size: Sequence[float] | None = None,
+    sh_degree: int = 2,
+    keep: Keep | int = 0,
+    check: bool = True,
+    points: bool = False,
+    names: Iterable[str] | None = None,
+    progress: Callable[[str, float], object] | None = None,
+    log: Callable[[LogLevel, str], object] | None = None,
+    context: Context | None = None,
+) -> Reconstruction:
+    """Reconstructs the vehicle that the photographs show; the arguments are those of vehicle_gaussians.reconstruct.
+
+    Pictures whose pixels lie together are read where they are, whatever lies between their rows.
+    """
+    images, cameras = list(images), list(cameras)
+    n = len(images)
+    columns: dict[str, list[Any]] = {
+        "cameras": cameras,
+        "masks": [None] * n if masks is None else list(masks),
+        "depths": [None] * n if depths is None else list(depths),
+        "names": [f"{i:03}" for i in range(n)] if names is None else list(names),
+    }
+    for argument, column in columns.items():
+        if len(column) != n:
+            raise VgError(Status.ARGUMENT, f"{argument}: {len(column)} entries; allowed: {n}, one per image")
+    alive: list[Any] = []
+    views = (vg_view * n)()
+    for i, image in enumerate(images):
+        views[i] = _initial(vg_view)
+        views[i].name = columns["names"][i].encode()
+        views[i].camera = _camera(cameras[i])
+        views[i].image = _photograph(image, f"images[{i}]", alive)
+        if columns["masks"][i] is not None:
+            views[i].mask = _mask(columns["masks"][i], f"masks[{i}]", alive)
+        if columns["depths"][i] is not None:
+            views[i].depth = _plane(columns["depths"][i], f"depths[{i}]", np.float32, Format.DEPTH32F, alive)
+
+    options = _initial(vg_options)
+    options.context = None if context is None else context._as_parameter_
+    options.prior, options.symmetry = _choice(Prior, "prior", prior), _choice(Symmetry, "symmetry", symmetry)
+    options.sh_degree, options.keep, options.check, options.points = sh_degree, keep, check, points
+    options.vehicle_size[:] = (0, 0, 0) if vehicle_size is None else vehicle_size
+    raised: list[BaseException] = []
+
+    def on_progress(stage: bytes, fraction: float, _: object) -> int:
+        try:
+            return int(bool(raised) or (progress is not None and bool(progress(stage.decode(), fraction))))
+        except BaseException as error:
+            raised.append(error)
+            return 1
+
+    # Always there: between two calls of it Python cannot see Ctrl-C.
+    options.progress = ProgressFn(on_progress)
+    options.log = LogFn(_logger(log, raised)) if log is not None else LogFn()
+    car, report = ct.c_void_p(), ct.c_void_p()
+    try:
+        with _signals_kept(raised):
+            _call("vg_reconstruct", views, n, ct.byref(options), ct.byref(car), ct.byref(report))
+    except VgError:
+        if not raised:
+            raise
+    gaussians, told = Gaussians(_Handle("gaussians", car)), _Handle("report", report)
+    if raised:
+        raise raised[0]
+    cloud = None
+    if points:
+        count = int(library.vg_report_point_count(told))
+        cloud = Points(
+            told.array(library.vg_report_point_positions(told), (count, 3), np.float32),
+            told.array(library.vg_report_point_colors(told), (count, 3), np.uint8),
+        )
+    return Reconstruction(gaussians, json.loads(library.vg_report_json(told)), cloud)
+
+
+@contextlib.contextmanager
+def _signals_kept(raised: list[BaseException]) -> Iterator[None]:
+    """Keeps what the handler of Ctrl-C raises: in a callback, ctypes would print it and forget it."""
+    usual = signal.getsignal(signal.SIGINT)
+    if not callable(usual) or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def keep(number: int, frame: FrameType | None) -> None:
+        try:
+            usual(number, frame)
+        except BaseException as error:
+            raised.append(error)
+
+    signal.signal(signal.SIGINT, keep)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
+
+
+def _logger(
+    log: Callable[[LogLevel, str], object], raised: list[BaseException]
+) -> Callable[[int, bytes, object], None]:
+    def on_log(level: int, message: bytes, _: object) -> None:
+        try:
+            log(LogLevel(level), _utf8(message))
+        except BaseException as error:
+            raised.append(error)
+
+    return on_log
+
+
+def _choice(choices: type[enum.IntEnum], argument: str, name: str) -> int:
+    member = choices.__members__.get(name.upper())
+    if member is None:
+        allowed = ", ".join(choices.__members__).lower()
+        raise VgError(Status.ARGUMENT, f"{argument}: {name!r}; allowed: {allowed}")
+    return int(member)
+
+
+def _expect(array: Any, argument: str, *dtypes: npt.DTypeLike) -> None:
+    if not isinstance(array, np.ndarray) or all(array.dtype != np.dtype(d) for d in dtypes):
+        found = f"array of {array.dtype}" if isinstance(array, np.ndarray) else type(array).__name__
+        allowed = " or ".join(str(np.dtype(d)) for d in dtypes)
+        raise TypeError(f"{argument}: {found}; allowed: a NumPy array of {allowed}")
+
+
+def _photograph(array: npt.NDArray[np.uint8], argument: str, alive: list[Any]) -> vg_image:
+    _expect(array, argument, np.uint8)
+    formats = {3: Format.RGB8, 4: Format.RGBA8}
+    if array.ndim != 3 or array.shape[2] not in formats:
+        raise VgError(Status.ARGUMENT, f"{argument}: shape {array.shape}; allowed: (height, width, 3 or 4)")
+    return _lent(array, formats[array.shape[2]], alive)
+
+
+def _mask(array: npt.NDArray[Any], argument: str, alive: list[Any]) -> vg_image:
+    _expect(array, argument, np.uint8, np.bool_)
+    if array.dtype == np.bool_:
+        array = np.where(array, np.uint8(255), np.uint8(0))
+    return _plane(array, argument, np.uint8, Format.GRAY8, alive)
+
+
+def _plane(array: npt.NDArray[Any], argument: str, dtype: npt.DTypeLike, format: Format, alive: list[Any]) -> vg_image:
+    _expect(array, argument, dtype)
+    if array.ndim != 2:
+        raise VgError(Status.ARGUMENT, f"{argument}: shape {array.shape}; allowed: (height, width)")
+    return _lent(array, format, alive)
+
+
+def _lent(array: npt.NDArray[Any], format: Format, alive: list[Any]) -> vg_image:
+    """The pixels where they are, if they lie together and rows follow each other downwards; else a copy."""
+    height, width = array.shape[:2]
+    pixel = array.itemsize * (array.shape[2] if array.ndim == 3 else 1)
+    together = array.strides[1:] == ((pixel, array.itemsize) if array.ndim == 3 else (pixel,))
+    if not (together and array.strides[0] >= width * pixel):
+        array = np.ascontiguousarray(array)
+    alive.append(array)
+    return vg_image(array.ctypes.data, array.strides[0], width, height, format, 0)
+
+
+class Scene(NamedTuple):
+    """Views of one vehicle, a list entry each; the arrays are read-only views of the library's memory."""
+
+    images: list[npt.NDArray[np.uint8]]
+    #: 255 is vehicle.
+    masks: list[npt.NDArray[np.uint8] | None]
+    depths: list[npt.NDArray[np.float32] | None]
+    cameras: list[vg_camera]
+    names: list[str]
+
+
+def open_scene(
+    path: str | os.PathLike[str],
+    views: Iterable[str] | None = None,
+    vehicle_from_world: npt.ArrayLike | None = None,
+    *,
+    depth_scale: float | None = None,
+    load_depth: bool = True,
+    context: Context | None = None,
+) -> Scene:
+    """Opens a transforms.json, a folder with one, or a COLMAP folder; the arguments are those of
+    vehicle_gaussians.open_scene. What is legal but looks like a mistake is a warning."""
+    options = _initial(vg_scene_options)
+    options.context = None if context is None else context._as_parameter_
+    world = _optional_doubles(vehicle_from_world, (4, 4))
+    options.vehicle_from_world = _address(world)
+    wanted = [] if views is None else [name.encode() for name in views]
+    names = (ct.c_char_p * len(wanted))(*wanted)
+    if wanted:
+        options.names, options.name_count = names, len(wanted)
+    options.depth_scale, options.load_depth = depth_scale or 0.0, load_depth
+    notes: list[str] = []
+    raised: list[BaseException] = []
+    options.log = LogFn(_logger(lambda _, note: notes.append(note), raised))
+    path = Path(path)
+    has_transforms = path.is_file() or (path / "transforms.json").is_file()
+    made = ct.c_void_p()
+    name = "vg_transforms_open" if has_transforms else "vg_colmap_open"
+    _call(name, os.fsencode(path), ct.byref(options), ct.byref(made))
+    handle = _Handle("scene", made)
+    for note in notes:
+        warnings.warn(note, stacklevel=2)
+
+    scene = Scene([], [], [], [], [])
+    for i in range(library.vg_scene_view_count(handle)):
+        view = _initial(vg_view)
+        _call("vg_scene_get_view", handle, i, ct.byref(view))
+        size = (view.camera.height, view.camera.width)
+        scene.images.append(handle.array(view.image.data, (*size, 3), np.uint8))
+        scene.masks.append(handle.array(view.mask.data, size, np.uint8) if view.mask.data else None)
+        scene.depths.append(handle.array(view.depth.data, size, np.float32) if view.depth.data else None)
+        scene.cameras.append(vg_camera.from_buffer_copy(view.camera))
+        scene.names.append(_utf8(view.name))
+    return scene

@@ -1,0 +1,155 @@
+//! NumPy arrays in and out.
+
+use crate::errors::{bad_type, bad_value};
+use numpy::ndarray::{ArrayView, Dimension, IntoDimension};
+use numpy::{
+    Element, PyArray, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
+use pyo3::prelude::*;
+use vg::geometry::{Pose, Similarity};
+
+/// `object` as an array of `T` in row order, copied only if it lies in memory differently. The error names
+/// `argument`, what was found, and what is `allowed`.
+pub(crate) fn array<'py, T: Element>(
+    object: &Bound<'py, PyAny>,
+    argument: &str,
+    allowed: &str,
+) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
+    let py = object.py();
+    let numpy = py.import("numpy")?;
+    let found = || object.get_type().name().map_or_else(|_| "an object".into(), |n| n.to_string());
+    let any = numpy.call_method1("asarray", (object,)).map_err(|_| bad_type(argument, &found(), allowed))?;
+    let untyped = any.cast::<PyUntypedArray>()?;
+    let dtype = untyped.dtype();
+    if !dtype.is_equiv_to(&numpy::dtype::<T>(py)) {
+        let is_array = object.is_instance_of::<PyUntypedArray>();
+        let found = if is_array { format!("array of {dtype}") } else { found() };
+        return Err(bad_type(argument, &found, allowed));
+    }
+    let aligned = || any.getattr("flags")?.getattr("aligned")?.is_truthy();
+    let any = match untyped.is_c_contiguous() && aligned()? {
+        true => any,
+        false => numpy.call_method1("require", (any, py.None(), ["C", "A"]))?,
+    };
+    Ok(any.cast_into::<PyArray<T, _>>()?.try_readonly()?)
+}
+
+/// The numbers of an array in row order.
+pub(crate) fn values<'a, T: Element>(array: &'a PyReadonlyArrayDyn<'_, T>) -> PyResult<&'a [T]> {
+    Ok(array.as_slice()?)
+}
+
+/// A shape as Python writes it.
+pub(crate) fn shape_text(shape: &[usize]) -> String {
+    match shape {
+        [one] => format!("shape ({one},)"),
+        _ => format!("shape ({})", shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")),
+    }
+}
+
+/// Anything NumPy makes float64 numbers of, and its shape.
+pub(crate) fn numbers(
+    object: &Bound<'_, PyAny>,
+    argument: &str,
+    allowed: &str,
+) -> PyResult<(Vec<usize>, Vec<f64>)> {
+    let py = object.py();
+    let found = || object.get_type().name().map_or_else(|_| "an object".into(), |n| n.to_string());
+    let as_float64 = py.import("numpy")?.call_method1("asarray", (object, "float64"));
+    let any = as_float64.map_err(|_| bad_type(argument, &found(), allowed))?;
+    let array = array::<f64>(&any, argument, allowed)?;
+    Ok((array.shape().to_vec(), values(&array)?.to_vec()))
+}
+
+/// A list of `N` numbers.
+pub(crate) fn vector<const N: usize>(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<[f64; N]> {
+    let allowed = format!("{N} numbers");
+    let (shape, values) = numbers(object, argument, &allowed)?;
+    if shape != [N] {
+        return Err(bad_value(object.py(), argument, &shape_text(&shape), &allowed));
+    }
+    Ok(std::array::from_fn(|i| values[i]))
+}
+
+/// A 3x3 matrix, row-major.
+pub(crate) fn matrix3(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<[f64; 9]> {
+    let allowed = "a 3x3 matrix";
+    let (shape, values) = numbers(object, argument, allowed)?;
+    if shape != [3, 3] {
+        return Err(bad_value(object.py(), argument, &shape_text(&shape), allowed));
+    }
+    Ok(std::array::from_fn(|i| values[i]))
+}
+
+/// A rigid transform as a 3x4 or 4x4 matrix.
+pub(crate) fn pose(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<Pose> {
+    let rows = pose_rows(object, argument)?;
+    Pose::from_row_major(argument, &rows).map_err(|e| crate::errors::from_library(object.py(), e))
+}
+
+/// The upper three rows of a 3x4 or 4x4 matrix.
+pub(crate) fn pose_rows(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<[f64; 12]> {
+    let py = object.py();
+    let allowed = "a 3x4 or 4x4 matrix";
+    let (shape, values) = numbers(object, argument, allowed)?;
+    match shape[..] {
+        [3, 4] => {}
+        [4, 4] if values[12..] == [0.0, 0.0, 0.0, 1.0] => {}
+        [4, 4] => {
+            return Err(bad_value(py, argument, &format!("last row {:?}", &values[12..]), "0 0 0 1"));
+        }
+        _ => return Err(bad_value(py, argument, &shape_text(&shape), allowed)),
+    }
+    Ok(std::array::from_fn(|i| values[i]))
+}
+
+/// A similarity as a 4x4 matrix.
+pub(crate) fn similarity(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<Similarity> {
+    let py = object.py();
+    let allowed = "a 4x4 matrix";
+    let (shape, values) = numbers(object, argument, allowed)?;
+    if shape != [4, 4] {
+        return Err(bad_value(py, argument, &shape_text(&shape), allowed));
+    }
+    let m = std::array::from_fn(|i| values[i]);
+    Similarity::from_row_major(argument, &m).map_err(|e| crate::errors::from_library(py, e))
+}
+
+/// A new array that takes over the memory of `values`.
+pub(crate) fn owned<T: Element, D: IntoDimension>(
+    py: Python<'_>,
+    shape: D,
+    values: Vec<T>,
+) -> Bound<'_, PyArray<T, D::Dim>>
+where
+    D::Dim: Dimension,
+{
+    let array = numpy::ndarray::Array::from_shape_vec(shape.into_dimension(), values);
+    PyArray::from_owned_array(py, array.expect("as many values as the shape has places"))
+}
+
+/// A 4x4 matrix.
+pub(crate) fn matrix4<'py>(py: Python<'py>, rows: &[f64]) -> Bound<'py, PyArray<f64, numpy::Ix2>> {
+    let mut m = rows.to_vec();
+    if m.len() == 12 {
+        m.extend([0.0, 0.0, 0.0, 1.0]);
+    }
+    owned(py, (4, 4), m)
+}
+
+/// A read-only array over memory of `owner`, which it keeps alive.
+///
+/// # Safety
+/// `view` must look at memory that stays where it is, unchanged, as long as `owner` lives.
+#[expect(unsafe_code)]
+pub(crate) unsafe fn borrowed<'py, T: Element, D: Dimension>(
+    owner: Bound<'py, PyAny>,
+    view: &ArrayView<'_, T, D>,
+) -> Bound<'py, PyArray<T, D>> {
+    // SAFETY: the caller's promise.
+    let array = unsafe { PyArray::borrow_from_array(view, owner) };
+    // Python cannot set the flag again: the array does not own its memory, and its owner offers no way to write.
+    let array = array.readwrite().make_nonwriteable();
+    (*array).clone()
+}

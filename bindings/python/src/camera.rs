@@ -1,0 +1,276 @@
+//! `Camera`, and poses from other software's conventions.
+
+use crate::arrays::{matrix3, matrix4, numbers, owned, pose, pose_rows, shape_text, similarity, vector};
+use crate::errors::{bad_type, bad_value, from_library};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyString;
+use vg::Pose;
+use vg::geometry::{CameraModel, Distortion, Intrinsics, OpenCvModel, Similarity, frame};
+
+/// A posed camera. It does not change: methods return new ones.
+#[pyclass(module = "vehicle_gaussians", frozen, eq)]
+#[derive(Clone, PartialEq)]
+pub(crate) struct Camera {
+    pub(crate) inner: vg::Camera,
+}
+
+#[pymethods]
+impl Camera {
+    /// From a COLMAP camera model, by name or number, and its parameters in COLMAP's order.
+    ///
+    /// vehicle_from_camera is a 3x4 or 4x4 rigid transform in metres; camera axes are x right, y down, z forward.
+    #[staticmethod]
+    #[pyo3(signature = (model, width, height, params, vehicle_from_camera))]
+    fn from_colmap(
+        model: &Bound<'_, PyAny>,
+        width: u32,
+        height: u32,
+        params: &Bound<'_, PyAny>,
+        vehicle_from_camera: &Bound<'_, PyAny>,
+    ) -> PyResult<Self> {
+        let py = model.py();
+        let model = camera_model(model)?;
+        let (shape, values) = numbers(params, "params", "a list of numbers")?;
+        if shape.len() != 1 {
+            return Err(bad_value(py, "params", &shape_text(&shape), "a list of numbers"));
+        }
+        let pose = pose(vehicle_from_camera, "vehicle_from_camera")?;
+        vg::Camera::from_colmap("camera", model, width, height, &values, pose)
+            .map(|inner| Self { inner })
+            .map_err(|e| from_library(py, e))
+    }
+
+    /// From a 3x3 matrix K of focal lengths and principal point in pixels, without skew.
+    ///
+    /// The centre of the top-left pixel is (0.5, 0.5), as in COLMAP: a principal point in the middle is width / 2. For
+    /// the K of OpenCV's calibration use from_opencv. distortion is k1, k2, p1, p2[, k3[, k4, k5, k6]].
+    #[staticmethod]
+    #[pyo3(signature = (K, vehicle_from_camera, width, height, distortion=None))]
+    #[expect(non_snake_case)]
+    fn from_matrix(
+        K: &Bound<'_, PyAny>,
+        vehicle_from_camera: &Bound<'_, PyAny>,
+        width: u32,
+        height: u32,
+        distortion: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let k = matrix3(K, "K")?;
+        let mut camera = Self::from_opencv(K, vehicle_from_camera, width, height, distortion, false)?;
+        (camera.inner.intrinsics.cx, camera.inner.intrinsics.cy) = (k[2], k[5]);
+        Ok(camera)
+    }
+
+    /// From OpenCV's calibration, which puts the centre of the top-left pixel at (0, 0): half a pixel is added to the
+    /// principal point.
+    ///
+    /// distortion is that of cv2.calibrateCamera or, with fisheye=True, of cv2.fisheye.
+    #[staticmethod]
+    #[pyo3(signature = (K, vehicle_from_camera, width, height, distortion=None, *, fisheye=false))]
+    #[expect(non_snake_case)]
+    fn from_opencv(
+        K: &Bound<'_, PyAny>,
+        vehicle_from_camera: &Bound<'_, PyAny>,
+        width: u32,
+        height: u32,
+        distortion: Option<&Bound<'_, PyAny>>,
+        fisheye: bool,
+    ) -> PyResult<Self> {
+        let model = if fisheye { OpenCvModel::Fisheye } else { OpenCvModel::Standard };
+        let distortion = match distortion {
+            None => Vec::new(),
+            // OpenCV hands out (1, n) and (n, 1) too.
+            Some(object) => numbers(object, "distortion", "a list of numbers")?.1,
+        };
+        let pose = pose(vehicle_from_camera, "vehicle_from_camera")?;
+        vg::Camera::from_opencv("camera", &matrix3(K, "K")?, &distortion, model, width, height, pose)
+            .map(|inner| Self { inner })
+            .map_err(|e| from_library(K.py(), e))
+    }
+
+    /// The same camera for pictures resized to width x height.
+    #[pyo3(signature = (width, height))]
+    fn scaled(&self, py: Python<'_>, width: u32, height: u32) -> PyResult<Self> {
+        let resized = self.inner.resized(width, height).map_err(|e| from_library(py, e))?;
+        Ok(Self { inner: resized })
+    }
+
+    /// The camera of the part image[y : y + height, x : x + width] of its pictures.
+    #[pyo3(signature = (x, y, width, height))]
+    fn cropped(&self, py: Python<'_>, x: u32, y: u32, width: u32, height: u32) -> PyResult<Self> {
+        let part = self.inner.cropped(x, y, width, height).map_err(|e| from_library(py, e))?;
+        Ok(Self { inner: part })
+    }
+
+    /// The same camera, lens included, in another place.
+    #[pyo3(signature = (vehicle_from_camera))]
+    fn with_pose(&self, vehicle_from_camera: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let vehicle_from_camera = pose(vehicle_from_camera, "vehicle_from_camera")?;
+        Ok(Self { inner: vg::Camera { vehicle_from_camera, ..self.inner } })
+    }
+
+    /// Columns.
+    #[getter]
+    fn width(&self) -> u32 {
+        self.inner.width
+    }
+
+    /// Rows.
+    #[getter]
+    fn height(&self) -> u32 {
+        self.inner.height
+    }
+
+    /// 3x3; the centre of the top-left pixel is (0.5, 0.5).
+    #[getter(K)]
+    fn matrix<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let Intrinsics { fx, fy, cx, cy } = self.inner.intrinsics;
+        owned(py, (3, 3), vec![fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0])
+    }
+
+    /// 4x4, metres.
+    #[getter]
+    fn vehicle_from_camera<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        matrix4(py, &self.inner.vehicle_from_camera.to_row_major())
+    }
+
+    /// The COLMAP model that holds this lens: PINHOLE, OPENCV, FULL_OPENCV or OPENCV_FISHEYE.
+    #[getter]
+    fn model(&self) -> &'static str {
+        self.colmap().0.name()
+    }
+
+    /// The parameters of that model, in COLMAP's order.
+    #[getter]
+    fn params<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.colmap().1)
+    }
+
+    fn __repr__(&self) -> String {
+        let [x, y, z] = self.inner.center().to_array();
+        let (model, params) = self.colmap();
+        let (width, height) = (self.inner.width, self.inner.height);
+        format!(
+            "Camera({model}, {width}x{height}, {params:?}, at ({x:.3}, {y:.3}, {z:.3}) m)",
+            model = model.name()
+        )
+    }
+}
+
+impl Camera {
+    /// The smallest of COLMAP's models that holds the lens, with its parameters.
+    fn colmap(&self) -> (CameraModel, Vec<f64>) {
+        let Intrinsics { fx, fy, cx, cy } = self.inner.intrinsics;
+        let mut params = vec![fx, fy, cx, cy];
+        let model = match self.inner.distortion {
+            Distortion::None => CameraModel::Pinhole,
+            Distortion::Fisheye { k } => {
+                params.extend(k);
+                CameraModel::OpenCvFisheye
+            }
+            Distortion::Brown { k, p } => {
+                params.extend([k[0], k[1], p[0], p[1]]);
+                if k[2..] == [0.0; 4] {
+                    CameraModel::OpenCv
+                } else {
+                    params.extend(&k[2..]);
+                    CameraModel::FullOpenCv
+                }
+            }
+        };
+        (model, params)
+    }
+}
+
+fn camera_model(model: &Bound<'_, PyAny>) -> PyResult<CameraModel> {
+    let (known, found) = if let Ok(name) = model.cast::<PyString>() {
+        (CameraModel::from_name(name.to_str()?), name.to_string())
+    } else if let Ok(id) = model.extract::<i32>() {
+        (CameraModel::from_id(id), id.to_string())
+    } else {
+        return Err(bad_type("model", &model.get_type().name()?.to_string(), "COLMAP's name or number"));
+    };
+    known.ok_or_else(|| {
+        let all = CameraModel::ALL.map(|m| format!("{} ({})", m.name(), m as i32)).join(", ");
+        let allowed = format!("{all}; undistort other models first (colmap image_undistorter)");
+        bad_value(model.py(), "model", &found, &allowed)
+    })
+}
+
+/// vehicle_from_camera (4x4) of COLMAP's world-to-camera quaternion (w, x, y, z) and translation.
+///
+/// vehicle_from_world is the similarity (4x4) from the model's world to the vehicle's frame; without, they are one.
+/// pycolmap keeps quaternions as (x, y, z, w).
+#[pyfunction]
+#[pyo3(signature = (qvec, tvec, vehicle_from_world=None))]
+pub(crate) fn pose_from_colmap<'py>(
+    qvec: &Bound<'py, PyAny>,
+    tvec: &Bound<'py, PyAny>,
+    vehicle_from_world: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (qvec_wxyz, translation) = (vector::<4>(qvec, "qvec")?, vector::<3>(tvec, "tvec")?);
+    let pose = frame::pose_from_colmap("qvec", qvec_wxyz, translation);
+    in_vehicle_frame(qvec.py(), pose, vehicle_from_world)
+}
+
+/// vehicle_from_camera (4x4) of a camera-to-world matrix with OpenGL's camera axes (x right, y up, z backward), as in
+/// nerfstudio's transforms.json and in Blender.
+///
+/// vehicle_from_world is the similarity (4x4) from that world to the vehicle's frame; without, they are one.
+#[pyfunction]
+#[pyo3(signature = (camera_to_world, vehicle_from_world=None))]
+pub(crate) fn pose_from_opengl<'py>(
+    camera_to_world: &Bound<'py, PyAny>,
+    vehicle_from_world: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let rows = pose_rows(camera_to_world, "camera_to_world")?;
+    let pose = frame::pose_from_opengl("camera_to_world", &rows);
+    in_vehicle_frame(camera_to_world.py(), pose, vehicle_from_world)
+}
+
+/// vehicle_from_camera (4x4) of a vehicle that was tracked as a box: the poses (3x4 or 4x4, metres) of the box and of
+/// the camera in one frame (ego, map, UTM) at the moment of the picture. The box's axes are x forward, y left, z up, and
+/// its origin lies on the vehicle's plane of symmetry.
+#[pyfunction]
+#[pyo3(signature = (ego_from_vehicle, ego_from_camera))]
+pub(crate) fn pose_from_box<'py>(
+    ego_from_vehicle: &Bound<'py, PyAny>,
+    ego_from_camera: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (vehicle, camera) =
+        (pose(ego_from_vehicle, "ego_from_vehicle")?, pose(ego_from_camera, "ego_from_camera")?);
+    Ok(matrix4(ego_from_vehicle.py(), &frame::pose_from_box(&vehicle, &camera).to_row_major()))
+}
+
+fn in_vehicle_frame<'py>(
+    py: Python<'py>,
+    world_from_camera: vg::Result<Pose>,
+    vehicle_from_world: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let mut pose = world_from_camera.map_err(|e| from_library(py, e))?;
+    if let Some(matrix) = vehicle_from_world {
+        pose = similarity(matrix, "vehicle_from_world")?.transform_pose(&pose);
+    }
+    Ok(matrix4(py, &pose.to_row_major()))
+}
+
+/// The similarity (4x4) that best takes points onto points, both (n, 3) with n >= 3 (Umeyama 1991): for example
+/// vehicle_from_world from camera centres that are known in both frames.
+#[pyfunction]
+#[pyo3(signature = (source, target))]
+pub(crate) fn similarity_from_points<'py>(
+    source: &Bound<'py, PyAny>,
+    target: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let py = source.py();
+    let points = |object: &Bound<'py, PyAny>, argument: &str| {
+        let allowed = "an (n, 3) array";
+        let (shape, values) = numbers(object, argument, allowed)?;
+        match shape[..] {
+            [_, 3] => Ok(values.as_chunks::<3>().0.iter().map(|&p| p.into()).collect::<Vec<_>>()),
+            _ => Err(bad_value(py, argument, &shape_text(&shape), allowed)),
+        }
+    };
+    let found = Similarity::umeyama(&points(source, "source")?, &points(target, "target")?);
+    Ok(matrix4(py, &found.map_err(|e| from_library(py, e))?.to_row_major()))
+}

@@ -1,0 +1,114 @@
+//! The way out of the GIL and back: errors become `VgError`, and so do panics.
+
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyType;
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Mutex, PoisonError};
+use vg::progress::Threads;
+
+/// Numbers of `vehicle_gaussians.Status`, which are the C library's.
+#[derive(Clone, Copy)]
+#[repr(i32)]
+pub(crate) enum Status {
+    Argument = 1,
+    Format = 2,
+    Io = 3,
+    Reconstruction = 4,
+    Cancelled = 5,
+    NotBuilt = 6,
+    Internal = 7,
+}
+
+/// Text and place of the last panic, for the message that its payload alone cannot give.
+static LAST_PANIC: Mutex<Option<(String, String)>> = Mutex::new(None);
+
+/// A `vehicle_gaussians.VgError`.
+pub(crate) fn vg_error(py: Python<'_>, status: Status, message: impl Into<String>) -> PyErr {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    match CLASS.import(py, "vehicle_gaussians._errors", "VgError") {
+        Ok(class) => PyErr::from_type(class.clone(), (status as i32, message.into())),
+        Err(error) => error,
+    }
+}
+
+/// An argument of the right kind with a value that is not accepted.
+pub(crate) fn bad_value(py: Python<'_>, argument: &str, found: &str, allowed: &str) -> PyErr {
+    vg_error(py, Status::Argument, format!("{argument}: {found}; allowed: {allowed}"))
+}
+
+/// An argument of the wrong kind.
+pub(crate) fn bad_type(argument: &str, found: &str, allowed: &str) -> PyErr {
+    PyTypeError::new_err(format!("{argument}: {found}; allowed: {allowed}"))
+}
+
+/// The library's error with the arguments' names in Python.
+pub(crate) fn from_library(py: Python<'_>, error: vg::Error) -> PyErr {
+    let status = match &error {
+        vg::Error::Argument { .. } => Status::Argument,
+        vg::Error::Format { .. } => Status::Format,
+        vg::Error::Io { .. } => Status::Io,
+        vg::Error::Reconstruction { .. } => Status::Reconstruction,
+        vg::Error::NotBuilt { .. } => Status::NotBuilt,
+        vg::Error::Cancelled { .. } => Status::Cancelled,
+        _ => Status::Internal,
+    };
+    let message = match error {
+        vg::Error::Argument { argument, found, allowed } => {
+            let argument = argument.strip_prefix("options.").unwrap_or(&argument);
+            format!("{}; allowed: {allowed}", [&argument.replace("rotations", "quats"), &*found].join(": "))
+        }
+        other => other.to_string(),
+    };
+    vg_error(py, status, message)
+}
+
+/// Runs `work` without the GIL.
+pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> vg::Result<T> + Send) -> PyResult<T> {
+    match py.detach(|| catch_unwind(AssertUnwindSafe(work))) {
+        Ok(Ok(value)) => Ok(value),
+        Ok(Err(error)) => Err(from_library(py, error)),
+        Err(panic) => Err(vg_error(py, Status::Internal, describe(panic.as_ref()))),
+    }
+}
+
+/// Runs `work` without the GIL, with `threads` worker threads that end with it; 0 means one per core.
+pub(crate) fn pooled<T: Send>(
+    py: Python<'_>,
+    threads: usize,
+    work: impl FnOnce() -> vg::Result<T> + Send,
+) -> PyResult<T> {
+    detached(py, || Threads::new(threads)?.run(work))
+}
+
+/// Keeps panics off standard error: they are caught, and their text travels in the exception.
+pub(crate) fn keep_panics_quiet() {
+    // The extension module has a standard library of its own: nobody else's panics pass here.
+    std::panic::set_hook(Box::new(|info| {
+        let place = info.location().map(ToString::to_string).unwrap_or_default();
+        *LAST_PANIC.lock().unwrap_or_else(PoisonError::into_inner) = Some((text(info.payload()), place));
+    }));
+}
+
+fn describe(payload: &(dyn Any + Send)) -> String {
+    let text = text(payload);
+    let last = LAST_PANIC.lock().unwrap_or_else(PoisonError::into_inner).take();
+    match last {
+        Some((same, place)) if same == text => format!("internal error: {text} ({place})"),
+        _ => format!("internal error: {text}"),
+    }
+}
+
+fn text(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<&str>().copied();
+    text.or_else(|| payload.downcast_ref().map(String::as_str)).unwrap_or("panic").to_owned()
+}
+
+/// For the tests: what a defect of the library would look like.
+#[pyfunction]
+#[pyo3(name = "_panic_on_a_worker_thread")]
+pub(crate) fn panic_on_a_worker_thread(py: Python<'_>) -> PyResult<()> {
+    pooled(py, 1, || panic!("made for a test"))
+}

@@ -1,0 +1,278 @@
+//! `Gaussians`: read-only arrays over the library's memory, pictures, and PLY files.
+
+use crate::arrays::{array, borrowed, owned, shape_text, similarity, values, vector};
+use crate::camera::Camera;
+use crate::errors::{bad_type, bad_value, from_library, pooled};
+use numpy::ndarray::ArrayView;
+use numpy::{Element, PyArray, PyArray1, PyArray2, PyArray3, PyArrayDescr, PyArrayDescrMethods};
+use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyString;
+use std::path::PathBuf;
+use std::sync::LazyLock;
+use vg::io::ply;
+use vg::render::{Background, CpuRenderer, RenderOptions, Rendered, Renderer};
+
+/// Draws for everybody: keeps its working memory, and the last lens, from picture to picture.
+static RENDERER: LazyLock<CpuRenderer> = LazyLock::new(CpuRenderer::new);
+
+/// The Gaussians of a vehicle, in its frame (x forward, y left, z up, metres). They do not change: methods return
+/// new ones, and the arrays are read-only views that keep them alive.
+#[pyclass(module = "vehicle_gaussians", frozen)]
+pub(crate) struct Gaussians {
+    pub(crate) inner: vg::Gaussians,
+}
+
+#[pymethods]
+impl Gaussians {
+    /// From float32 arrays of n Gaussians: means (n, 3) and scales (n, 3), standard deviations, in metres; quats
+    /// (n, 4) as (w, x, y, z) of any norm; opacities (n,) from 0 to 1; sh (n, (degree + 1)^2, 3).
+    #[staticmethod]
+    #[pyo3(signature = (means, scales, quats, opacities, sh))]
+    fn from_arrays(
+        means: &Bound<'_, PyAny>,
+        scales: &Bound<'_, PyAny>,
+        quats: &Bound<'_, PyAny>,
+        opacities: &Bound<'_, PyAny>,
+        sh: &Bound<'_, PyAny>,
+    ) -> PyResult<Self> {
+        let py = means.py();
+        let sh = floats(sh, "sh")?;
+        let sh_degree = match sh.shape() {
+            [_, 1, 3] => 0,
+            [_, 4, 3] => 1,
+            [_, 9, 3] => 2,
+            [_, 16, 3] => 3,
+            other => {
+                return Err(bad_value(py, "sh", &shape_text(other), "(n, K, 3) with K = 1, 4, 9 or 16"));
+            }
+        };
+        let opacities = floats(opacities, "opacities")?;
+        if opacities.shape().len() != 1 {
+            return Err(bad_value(py, "opacities", &shape_text(opacities.shape()), "(n,)"));
+        }
+        vg::Gaussians::from_arrays(
+            sh_degree,
+            rows::<3>(means, "means")?,
+            rows::<4>(quats, "quats")?,
+            rows::<3>(scales, "scales")?,
+            values(&opacities)?.to_vec(),
+            values(&sh)?.to_vec(),
+        )
+        .map(|inner| Self { inner })
+        .map_err(|e| from_library(py, e))
+    }
+
+    /// Reads a PLY file in the layout of 3D Gaussian Splatting.
+    #[staticmethod]
+    #[pyo3(signature = (path))]
+    fn load_ply(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let (inner, _) = pooled(py, 1, || ply::read(&path))?;
+        Ok(Self { inner })
+    }
+
+    /// Writes a PLY file in the layout of 3D Gaussian Splatting. A file that is there is replaced only once the new
+    /// one is complete.
+    #[pyo3(signature = (path))]
+    fn save_ply(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        pooled(py, 1, || ply::write(&path, &self.inner))
+    }
+
+    /// The mirror image across the plane of symmetry, y = 0.
+    #[pyo3(signature = ())]
+    fn mirrored(&self, py: Python<'_>) -> PyResult<Self> {
+        pooled(py, 1, || Ok(self.inner.mirrored())).map(|inner| Self { inner })
+    }
+
+    /// These in another frame: to_from_vehicle is a 4x4 similarity. Colours turn with the vehicle. Coordinates must stay
+    /// below 16384 m, where a float32 still holds a millimetre.
+    #[pyo3(signature = (to_from_vehicle))]
+    fn transformed(&self, to_from_vehicle: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let similarity = similarity(to_from_vehicle, "to_from_vehicle")?;
+        let inner = pooled(to_from_vehicle.py(), 0, || self.inner.transformed(&similarity))?;
+        Ok(Self { inner })
+    }
+
+    /// These, then those of other, at the higher of their degrees of spherical harmonics.
+    #[pyo3(signature = (other))]
+    fn merged(&self, py: Python<'_>, other: &Bound<'_, Self>) -> PyResult<Self> {
+        let other = &other.get().inner;
+        pooled(py, 1, || Ok(self.inner.merged(other))).map(|inner| Self { inner })
+    }
+
+    /// The picture a camera takes: uint8 (height, width, 3), or (height, width, 4) with straight alpha on a
+    /// "transparent" background. With dtype float32 colours are not clamped above 1. With depth=True a pair of the
+    /// picture and its depth in metres, float32 (height, width), 0 where there is nothing.
+    ///
+    /// background is "white", "black", "transparent" or (r, g, b) from 0 to 1; near and far are metres; sh_degree leaves
+    /// out the colour's bands above it; threads=0 means one per core.
+    #[pyo3(signature = (
+        camera, background=None, depth=false, threads=0, *,
+        dtype=None, antialiased=false, near=0.01, far=1e10, sh_degree=3
+    ), text_signature = "(self, camera, background='white', depth=False, threads=0, *, dtype='uint8', \
+        antialiased=False, near=0.01, far=1e10, sh_degree=3)")]
+    fn render<'py>(
+        &self,
+        py: Python<'py>,
+        camera: &Bound<'py, Camera>,
+        background: Option<&Bound<'py, PyAny>>,
+        depth: bool,
+        threads: usize,
+        dtype: Option<&Bound<'py, PyAny>>,
+        antialiased: bool,
+        near: f32,
+        far: f32,
+        sh_degree: u8,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let background = background.map_or(Ok(Background::Color([1.0; 3])), parse_background)?;
+        let kind = dtype.map_or(Ok(Kind::Bytes), Kind::of)?;
+        let options =
+            RenderOptions { background, antialiased, near, far, sh_degree, ..RenderOptions::default() };
+        let camera = &camera.get().inner;
+        let mut drawn = pooled(py, threads, || RENDERER.render(&self.inner, camera, &options))?;
+        let size = (drawn.height as usize, drawn.width as usize);
+        let picture = match (kind, background) {
+            (Kind::Bytes, Background::Color(_)) => picture(py, size, drawn.to_rgb8()),
+            (Kind::Bytes, Background::Transparent) => picture(py, size, drawn.to_rgba8()),
+            (Kind::Floats, Background::Transparent) => picture(py, size, straight(&drawn)),
+            (Kind::Floats, Background::Color(_)) => picture(py, size, std::mem::take(&mut drawn.color)),
+        };
+        match depth {
+            false => Ok(picture),
+            true => Ok((picture, owned(py, size, drawn.depth)).into_pyobject(py)?.into_any()),
+        }
+    }
+
+    /// Centres, metres. (n, 3)
+    #[getter]
+    fn means<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray2<f32>> {
+        view(this, (this.get().inner.len(), 3), this.get().inner.means().as_flattened())
+    }
+
+    /// Standard deviations along the Gaussians' own axes, metres. (n, 3)
+    #[getter]
+    fn scales<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray2<f32>> {
+        view(this, (this.get().inner.len(), 3), this.get().inner.scales().as_flattened())
+    }
+
+    /// vehicle_from_gaussian, unit quaternions (w, x, y, z). (n, 4)
+    #[getter]
+    fn quats<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray2<f32>> {
+        view(this, (this.get().inner.len(), 4), this.get().inner.rotations().as_flattened())
+    }
+
+    /// Peak opacities, 0 to 1. (n,)
+    #[getter]
+    fn opacities<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray1<f32>> {
+        view(this, this.get().inner.len(), this.get().inner.opacities())
+    }
+
+    /// Spherical harmonics in the order and with the signs of 3D Gaussian Splatting, RGB last:
+    /// colour = 0.5 + sum of coefficient times basis. (n, (degree + 1)^2, 3)
+    #[getter]
+    fn sh<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray3<f32>> {
+        let g = &this.get().inner;
+        view(this, (g.len(), g.sh_stride() / 3, 3), g.sh())
+    }
+
+    /// Highest degree of the spherical harmonics, 0 to 3.
+    #[getter]
+    fn sh_degree(&self) -> u8 {
+        self.inner.sh_degree()
+    }
+
+    /// Lowest and highest centre, metres, or None when there is no Gaussian. (2, 3)
+    #[getter]
+    fn bounds<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f32>>> {
+        let (low, high) = self.inner.bounds()?;
+        Some(owned(py, (2, 3), [low, high].concat()))
+    }
+
+    fn __len__(&self) -> usize {
+        self.inner.len()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Gaussians({}, sh_degree={})", self.inner.len(), self.inner.sh_degree())
+    }
+}
+
+/// A read-only array over memory of the Gaussians.
+fn view<'py, T: Element, D: numpy::ndarray::IntoDimension>(
+    owner: &Bound<'py, Gaussians>,
+    shape: D,
+    values: &[T],
+) -> Bound<'py, PyArray<T, D::Dim>> {
+    let view = ArrayView::from_shape(shape.into_dimension(), values).expect("as many values as the shape");
+    // SAFETY: the class is frozen and never touches its arrays, so that they stay as they are while it lives.
+    #[expect(unsafe_code)]
+    unsafe {
+        borrowed(owner.clone().into_any(), &view)
+    }
+}
+
+fn floats<'py>(object: &Bound<'py, PyAny>, argument: &str) -> PyResult<PyReadonlyArrayDyn<'py, f32>> {
+    array::<f32>(object, argument, "an array of float32")
+}
+
+/// An (n, N) array of float32.
+fn rows<const N: usize>(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<Vec<[f32; N]>> {
+    let array = floats(object, argument)?;
+    match array.shape() {
+        [_, n] if *n == N => Ok(values(&array)?.as_chunks::<N>().0.to_vec()),
+        other => Err(bad_value(object.py(), argument, &shape_text(other), &format!("(n, {N})"))),
+    }
+}
+
+fn parse_background(object: &Bound<'_, PyAny>) -> PyResult<Background> {
+    let Ok(name) = object.cast::<PyString>() else {
+        return vector::<3>(object, "background").map(|rgb| Background::Color(rgb.map(|c| c as f32)));
+    };
+    match name.to_str()? {
+        "white" => Ok(Background::Color([1.0; 3])),
+        "black" => Ok(Background::Color([0.0; 3])),
+        "transparent" => Ok(Background::Transparent),
+        other => {
+            let allowed = "white, black, transparent, or (r, g, b) from 0 to 1";
+            Err(bad_value(object.py(), "background", &format!("{other:?}"), allowed))
+        }
+    }
+}
+
+/// What the numbers of a picture are.
+#[derive(Clone, Copy)]
+enum Kind {
+    Bytes,
+    Floats,
+}
+
+impl Kind {
+    fn of(dtype: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let py = dtype.py();
+        let asked = PyArrayDescr::new(py, dtype)?;
+        if asked.is_equiv_to(&numpy::dtype::<u8>(py)) {
+            Ok(Self::Bytes)
+        } else if asked.is_equiv_to(&numpy::dtype::<f32>(py)) {
+            Ok(Self::Floats)
+        } else {
+            Err(bad_type("dtype", &asked.to_string(), "uint8 or float32"))
+        }
+    }
+}
+
+fn picture<T: Element, const N: usize>(
+    py: Python<'_>,
+    (height, width): (usize, usize),
+    pixels: Vec<[T; N]>,
+) -> Bound<'_, PyAny> {
+    owned(py, (height, width, N), pixels.into_flattened()).into_any()
+}
+
+/// RGBA with straight alpha.
+fn straight(drawn: &Rendered) -> Vec<[f32; 4]> {
+    let pixel = |(c, &a): (&[f32; 3], &f32)| {
+        let scale = if a > 0.0 { 1.0 / a } else { 0.0 };
+        [c[0] * scale, c[1] * scale, c[2] * scale, a]
+    };
+    drawn.color.iter().zip(&drawn.alpha).map(pixel).collect()
+}

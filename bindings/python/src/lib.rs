@@ -1,0 +1,37 @@
+//! `vehicle_gaussians._native`: the library as Python sees it, NumPy arrays in and out.
+//!
+//! * Pixels are copied once on the way in; Gaussians are not copied on the way out (read-only views).
+//! * The library works without the GIL, on threads of its own that end with the call, so that a forked process is
+//!   none the worse for what its parent drew.
+//! * Whatever goes wrong is a `VgError`, or a `TypeError` for the wrong kind of object; a panic is no exception.
+
+mod arrays;
+mod camera;
+mod errors;
+mod gaussians;
+mod reconstruct;
+mod scene;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use crate::camera::{Camera, pose_from_box, pose_from_colmap, pose_from_opengl, similarity_from_points};
+    #[pymodule_export]
+    use crate::errors::panic_on_a_worker_thread;
+    #[pymodule_export]
+    use crate::gaussians::Gaussians;
+    #[pymodule_export]
+    use crate::reconstruct::reconstruct;
+    #[pymodule_export]
+    use crate::scene::open_scene;
+
+    use super::{Bound, PyModule, PyModuleMethods, PyResult};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        crate::errors::keep_panics_quiet();
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

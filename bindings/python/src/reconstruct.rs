@@ -1,0 +1,265 @@
+//! Photographs in memory to Gaussians.
+
+use crate::arrays::{array, owned, shape_text, values};
+use crate::camera::Camera;
+use crate::errors::{bad_type, bad_value, detached, from_library};
+use crate::gaussians::Gaussians;
+use numpy::{PyArray2, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::exceptions::PyUserWarning;
+use pyo3::prelude::*;
+use pyo3::types::PyString;
+use std::ops::ControlFlow;
+use vg::pipeline::{Keep, Options, PriorChoice};
+use vg::progress::Progress;
+use vg::scene::image::PixelFormat;
+use vg::scene::mask::VEHICLE_THRESHOLD;
+use vg::scene::{DepthMap, Mask, RgbImage};
+use vg::symmetry::SymmetryMode;
+use vg::{Scene, View};
+
+/// Positions (n, 3) and colours (n, 3).
+type Points<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>);
+
+/// The Gaussians, the report as JSON, and the points if asked for.
+#[pyfunction]
+#[pyo3(signature = (
+    images, masks, cameras, depths, *, prior, symmetry, vehicle_size, sh_degree, keep, check, points, threads, names,
+    progress
+))]
+pub(crate) fn reconstruct<'py>(
+    py: Python<'py>,
+    images: Vec<Bound<'py, PyAny>>,
+    masks: Option<Vec<Bound<'py, PyAny>>>,
+    cameras: Vec<Bound<'py, PyAny>>,
+    depths: Option<Vec<Bound<'py, PyAny>>>,
+    prior: &str,
+    symmetry: &str,
+    vehicle_size: Option<[f64; 3]>,
+    sh_degree: u8,
+    keep: Vec<String>,
+    check: bool,
+    points: bool,
+    threads: usize,
+    names: Option<Vec<String>>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(Gaussians, String, Option<Points<'py>>)> {
+    let options = Options {
+        prior: parse_prior(py, prior)?,
+        symmetry: parse_symmetry(py, symmetry)?,
+        vehicle_size,
+        sh_degree,
+        keep: parse_keep(py, &keep)?,
+        check,
+        threads,
+        points,
+    };
+    // Before the pixels are copied.
+    options.validate().map_err(|e| from_library(py, e))?;
+    let scene = scene_of(py, &images, masks.as_deref(), &cameras, depths.as_deref(), names)?;
+
+    let mut raised = None;
+    let made = detached(py, || {
+        let mut tell = |state: Progress| match Python::attach(|py| goes_on(py, progress.as_ref(), state)) {
+            Ok(true) => ControlFlow::Continue(()),
+            Ok(false) => ControlFlow::Break(()),
+            Err(error) => {
+                raised = Some(error);
+                ControlFlow::Break(())
+            }
+        };
+        let made = vg::pipeline::reconstruct(&scene, &options, &mut tell)?;
+        // Nothing to say here if the library cannot write its own report: it is no part of the vehicle.
+        let report = serde_json::to_string(&made.report).unwrap_or_default();
+        Ok((made, report))
+    });
+    if let Some(error) = raised {
+        return Err(error);
+    }
+    let (made, report) = made?;
+    let points = made.points.map(|cloud| {
+        let n = cloud.positions.len();
+        let positions = owned(py, (n, 3), cloud.positions.into_flattened());
+        (positions, owned(py, (n, 3), cloud.colors.into_flattened()))
+    });
+    Ok((Gaussians { inner: made.gaussians }, report, points))
+}
+
+/// Whether to go on: not after Ctrl-C, an exception of the caller's function, or its true value.
+fn goes_on(py: Python<'_>, progress: Option<&Py<PyAny>>, state: Progress) -> PyResult<bool> {
+    py.check_signals()?;
+    match progress {
+        None => Ok(true),
+        Some(function) => Ok(!function.bind(py).call1((state.stage, state.fraction))?.is_truthy()?),
+    }
+}
+
+fn scene_of(
+    py: Python<'_>,
+    images: &[Bound<'_, PyAny>],
+    masks: Option<&[Bound<'_, PyAny>]>,
+    cameras: &[Bound<'_, PyAny>],
+    depths: Option<&[Bound<'_, PyAny>]>,
+    names: Option<Vec<String>>,
+) -> PyResult<Scene> {
+    if images.is_empty() {
+        return Err(bad_value(py, "images", "none", "at least one"));
+    }
+    let lengths = [
+        ("cameras", Some(cameras.len())),
+        ("masks", masks.map(<[_]>::len)),
+        ("depths", depths.map(<[_]>::len)),
+        ("names", names.as_ref().map(Vec::len)),
+    ];
+    for (argument, length) in lengths {
+        if length.is_some_and(|n| n != images.len()) {
+            let found = format!("{} entries", length.unwrap_or_default());
+            return Err(bad_value(py, argument, &found, &format!("{}, one per image", images.len())));
+        }
+    }
+    let views = images.iter().enumerate().map(|(i, image)| {
+        let camera = cameras[i].cast::<Camera>().map_err(|_| {
+            let found = cameras[i].get_type().name().map_or_else(|_| "an object".into(), |n| n.to_string());
+            bad_type(&format!("cameras[{i}]"), &found, "a Camera")
+        })?;
+        let camera = camera.get().inner;
+        let (image, cut_out) = picture(image, i, &camera)?;
+        let mask = match masks.map(|list| &list[i]).filter(|o| !o.is_none()) {
+            Some(object) => Some(mask(object, i, &camera)?),
+            None => cut_out,
+        };
+        let depth = depths.map(|list| &list[i]).filter(|o| !o.is_none());
+        let depth = depth.map(|object| self::depth(object, i, &camera)).transpose()?;
+        let name = names.as_ref().map_or_else(|| format!("{i:03}"), |names| names[i].clone());
+        Ok(View { name, camera, image, mask, depth })
+    });
+    Ok(Scene { views: views.collect::<PyResult<_>>()? })
+}
+
+/// The picture, and the mask its alpha channel makes if it is transparent somewhere.
+fn picture(object: &Bound<'_, PyAny>, i: usize, camera: &vg::Camera) -> PyResult<(RgbImage, Option<Mask>)> {
+    let py = object.py();
+    let argument = format!("images[{i}]");
+    let pixels =
+        array::<u8>(object, &argument, "a NumPy array of uint8, (height, width, 3) or (height, width, 4)")?;
+    let (width, height) = (camera.width, camera.height);
+    let format = match pixels.shape() {
+        [h, w, 3] if (*h, *w) == (height as usize, width as usize) => PixelFormat::Rgb8,
+        [h, w, 4] if (*h, *w) == (height as usize, width as usize) => PixelFormat::Rgba8,
+        other => {
+            let allowed = format!("({height}, {width}, 3) or ({height}, {width}, 4), its camera's size");
+            return Err(bad_value(py, &argument, &shape_text(other), &allowed));
+        }
+    };
+    let data = values(&pixels)?;
+    let stride = width as usize * format.bytes_per_pixel();
+    let library = |e| from_library(py, e);
+    let image = RgbImage::from_strided(&argument, data, width, height, stride, format).map_err(library)?;
+    let alpha = || data.iter().skip(3).step_by(4).copied();
+    if format == PixelFormat::Rgb8 || alpha().all(|a| a == u8::MAX) {
+        return Ok((image, None));
+    }
+    let alpha: Vec<u8> = alpha().collect();
+    let mask = Mask::from_strided(&argument, &alpha, width, height, width as usize).map_err(library)?;
+    Ok((image, Some(mask)))
+}
+
+fn mask(object: &Bound<'_, PyAny>, i: usize, camera: &vg::Camera) -> PyResult<Mask> {
+    let py = object.py();
+    let argument = format!("masks[{i}]");
+    let allowed = "a NumPy array of bool, or of uint8 where 128 and above is vehicle, (height, width)";
+    // Of one byte each, 0 or 1.
+    let is_bool = object.cast::<PyUntypedArray>().is_ok_and(|a| numpy_is_bool(py, a));
+    let labels: Vec<u8>;
+    let bytes;
+    let (shape, data) = if is_bool {
+        let flags = array::<bool>(object, &argument, allowed)?;
+        labels = values(&flags)?.iter().map(|&v| if v { u8::MAX } else { 0 }).collect();
+        (flags.shape().to_vec(), &labels[..])
+    } else {
+        bytes = array::<u8>(object, &argument, allowed)?;
+        (bytes.shape().to_vec(), values(&bytes)?)
+    };
+    same_size(py, &argument, &shape, camera)?;
+    let largest = data.iter().copied().max().unwrap_or(0);
+    if (1..VEHICLE_THRESHOLD).contains(&largest) {
+        let text = format!(
+            "{argument}: the largest value is {largest}, and vehicle begins at {VEHICLE_THRESHOLD}: the mask is empty"
+        );
+        warn(py, &text)?;
+    }
+    Mask::from_strided(&argument, data, camera.width, camera.height, camera.width as usize)
+        .map_err(|e| from_library(py, e))
+}
+
+fn numpy_is_bool(py: Python<'_>, array: &Bound<'_, PyUntypedArray>) -> bool {
+    use numpy::PyArrayDescrMethods;
+    array.dtype().is_equiv_to(&numpy::dtype::<bool>(py))
+}
+
+fn depth(object: &Bound<'_, PyAny>, i: usize, camera: &vg::Camera) -> PyResult<DepthMap> {
+    let py = object.py();
+    let argument = format!("depths[{i}]");
+    let metres = array::<f32>(object, &argument, "a NumPy array of float32, metres, (height, width)")?;
+    same_size(py, &argument, metres.shape(), camera)?;
+    let stride = camera.width as usize;
+    DepthMap::from_strided(&argument, values(&metres)?, camera.width, camera.height, stride)
+        .map_err(|e| from_library(py, e))
+}
+
+fn same_size(py: Python<'_>, argument: &str, shape: &[usize], camera: &vg::Camera) -> PyResult<()> {
+    if shape == [camera.height as usize, camera.width as usize] {
+        return Ok(());
+    }
+    let allowed = format!("({}, {}), its camera's size", camera.height, camera.width);
+    Err(bad_value(py, argument, &shape_text(shape), &allowed))
+}
+
+/// Something that is legal but looks like a mistake.
+pub(crate) fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
+    let text = PyString::new(py, text);
+    // The line that called vehicle_gaussians.reconstruct or open_scene.
+    const CALLER: i32 = 2;
+    let warnings = py.import("warnings")?;
+    warnings.call_method1("warn", (text, py.get_type::<PyUserWarning>(), CALLER))?;
+    Ok(())
+}
+
+fn parse_prior(py: Python<'_>, name: &str) -> PyResult<PriorChoice> {
+    match name {
+        "auto" => Ok(PriorChoice::Auto),
+        "given" => Ok(PriorChoice::Given),
+        "hull" => Ok(PriorChoice::Hull),
+        other => Err(bad_value(py, "prior", &format!("{other:?}"), "auto, given, hull")),
+    }
+}
+
+fn parse_symmetry(py: Python<'_>, name: &str) -> PyResult<SymmetryMode> {
+    match name {
+        "auto" => Ok(SymmetryMode::Auto),
+        "always" => Ok(SymmetryMode::Always),
+        "never" => Ok(SymmetryMode::Never),
+        other => Err(bad_value(py, "symmetry", &format!("{other:?}"), "auto, always, never")),
+    }
+}
+
+fn parse_keep(py: Python<'_>, names: &[String]) -> PyResult<Keep> {
+    let mut keep = Keep::default();
+    let Keep { duplicate_views, overlap, silhouette_edge, floaters, sh_bands } = &mut keep;
+    for name in names {
+        let all = &mut [&mut *duplicate_views, overlap, silhouette_edge, floaters, sh_bands];
+        let chosen = match name.as_str() {
+            "all" => &mut all[..],
+            "duplicate-views" => &mut all[0..1],
+            "overlap" => &mut all[1..2],
+            "silhouette-edge" => &mut all[2..3],
+            "floaters" => &mut all[3..4],
+            "sh-bands" => &mut all[4..5],
+            other => {
+                let allowed = "duplicate-views, overlap, silhouette-edge, floaters, sh-bands, all";
+                return Err(bad_value(py, "keep", &format!("{other:?}"), allowed));
+            }
+        };
+        chosen.iter_mut().for_each(|flag| **flag = true);
+    }
+    Ok(keep)
+}

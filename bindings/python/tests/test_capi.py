@@ -1,0 +1,409 @@
+"""The C interface through ctypes, held to the header by a C compiler and to the extension module by its bytes."""
+
+from __future__ import annotations
+
+import ctypes as ct
+import gc
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vehicle_gaussians as vg
+from conftest import INPUTS, SEDAN, Views, looking_at_the_origin, same_bytes
+from vehicle_gaussians import Status, capi
+
+HEADER = (capi.include_path() / "vg.h").read_text()
+STRUCTURES = [thing for name, thing in vars(capi).items() if name.startswith("vg_") and issubclass(thing, ct.Structure)]
+ENUMERATIONS = {
+    "vg_status": Status,
+    "vg_format": capi.Format,
+    "vg_camera_model": capi.CameraModel,
+    "vg_prior": capi.Prior,
+    "vg_symmetry": capi.Symmetry,
+    "vg_keep": capi.Keep,
+    "vg_log_level": capi.LogLevel,
+    "vg_backend": capi.Backend,
+    "vg_background": capi.Background,
+    "vg_alpha": capi.Alpha,
+    "vg_depth_mode": capi.DepthMode,
+}
+
+
+def test_every_function_of_the_header_is_declared_with_as_many_arguments() -> None:
+    declared = {}
+    for text in HEADER.split("\nVG_API\n")[1:]:
+        found = re.match(r"[^(]*?(vg_\w+)\s*\(([^;]*)\);", text)
+        assert found is not None, text[:80]
+        arguments = found.group(2).strip()
+        declared[found.group(1)] = 0 if arguments == "void" else arguments.count(",") + 1
+    assert declared == {name: len(arguments) for name, (_, arguments) in capi.PROTOTYPES.items()}
+    assert len(declared) > 50
+
+
+def test_every_enumerator_of_the_header_has_its_number() -> None:
+    code = re.sub(r"/\*.*?\*/", "", HEADER, flags=re.DOTALL)
+    found = {
+        name: {m: int(v) for m, v in re.findall(r"(VG_\w+) = (\d+)", body)}
+        for name, body in re.findall(r"^enum (vg_\w+)\n.*?\{(.*?)\};", code, flags=re.DOTALL | re.MULTILINE)
+    }
+    expected = {
+        name: {f"{name.upper()}_{member.name}": int(member) for member in members}
+        for name, members in ENUMERATIONS.items()
+    }
+    assert found == expected
+    number = re.search(r"#define VG_ABI_VERSION (\d+)", HEADER)
+    assert number is not None and int(number.group(1)) == capi.ABI_VERSION == capi.library.vg_abi_version()
+
+
+def test_every_structure_of_the_header_is_declared() -> None:
+    found = re.findall(r"^typedef struct (vg_\w+) \{", HEADER, flags=re.MULTILINE)
+    assert sorted(found) == sorted(s.__name__ for s in STRUCTURES)
+
+
+def test_structures_lie_in_memory_as_a_c_compiler_lays_them(tmp_path: Path) -> None:
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler")
+    lines, expected = [], []
+    for structure in STRUCTURES:
+        name = structure.__name__
+        lines.append(f'printf("{name} %zu\\n", sizeof({name}));')
+        expected.append(f"{name} {ct.sizeof(structure)}")
+        for field, *_ in structure._fields_:
+            place = getattr(structure, field)
+            lines.append(
+                f'printf("{name}.{field} %zu %zu\\n", offsetof({name}, {field}), sizeof((({name} *)0)->{field}));'
+            )
+            expected.append(f"{name}.{field} {place.offset} {place.size}")
+    source = tmp_path / "layout.c"
+    body = "\n".join(lines)
+    source.write_text(f'#include <stdio.h>\n#include "vg.h"\nint main(void) {{\n{body}\nreturn 0;\n}}\n')
+    program = tmp_path / "layout"
+    subprocess.run([compiler, f"-I{capi.include_path()}", source, "-o", program], check=True)
+    printed = subprocess.run([program], capture_output=True, text=True, check=True).stdout
+    assert printed.splitlines() == expected
+
+
+def test_version() -> None:
+    assert capi.version() == vg.__version__
+
+
+@pytest.mark.parametrize("depth", [True, False])
+def test_ctypes_and_the_extension_module_give_the_same_bytes(depth: bool, sedan: vg.Scene) -> None:
+    depths = sedan.depths if depth else None
+    ours = vg.reconstruct(sedan.images, sedan.masks, sedan.cameras, depths, points=True, names=sedan.names)
+    theirs = capi.reconstruct(sedan.images, sedan.masks, sedan.cameras, depths, points=True, names=sedan.names)
+    assert same_bytes(ours.gaussians, theirs.gaussians)
+    assert ours.points is not None and theirs.points is not None
+    for a, b in zip(ours.points, theirs.points, strict=True):
+        assert (a.shape, a.dtype) == (b.shape, b.dtype) and a.tobytes() == b.tobytes()
+
+    def without_times(report: dict[str, Any]) -> dict[str, Any]:
+        # The number of threads is a setting here and the context's there.
+        settings = {k: v for k, v in report["settings"].items() if k != "threads"}
+        changing = ("stages", "total_ms", "peak_rss_bytes", "settings")
+        return {**settings, **{k: v for k, v in report.items() if k not in changing}}
+
+    assert without_times(ours.report) == without_times(theirs.report)
+    camera = sedan.cameras[1]
+    for background in ("white", "transparent"):
+        for dtype in (np.uint8, np.float32):
+            picture, z = ours.gaussians.render(camera, background, depth=True, dtype=dtype)
+            picture_c, z_c = theirs.gaussians.render_with_depth(camera, background, dtype=dtype)
+            np.testing.assert_array_equal(picture, picture_c)
+            np.testing.assert_array_equal(z, z_c)
+
+
+def test_scenes_opened_through_ctypes_give_the_same_bytes(
+    sedan: vg.Scene, sedan_made: vg.Reconstruction, tmp_path: Path
+) -> None:
+    scene = capi.open_scene(SEDAN, INPUTS)
+    assert scene.names == sedan.names
+    for i in range(4):
+        np.testing.assert_array_equal(scene.images[i], sedan.images[i])
+        np.testing.assert_array_equal(scene.masks[i] == 255, sedan.masks[i])
+        np.testing.assert_array_equal(scene.depths[i], sedan.depths[i])
+    made = capi.reconstruct(scene.images, scene.masks, scene.cameras, scene.depths)
+    assert same_bytes(made.gaussians, sedan_made.gaussians)
+    image = scene.images[0]
+    before = image.copy()
+    del scene
+    gc.collect()
+    np.testing.assert_array_equal(image, before)
+    assert not image.flags.writeable
+
+    for part in ("images", "masks", "sparse"):
+        shutil.copytree(SEDAN / part, tmp_path / part)
+    with pytest.raises(vg.VgError, match="vehicle_from_world") as caught:
+        capi.open_scene(tmp_path)
+    assert caught.value.code is Status.FORMAT
+    vehicle_from_world = np.eye(4)
+    assert len(capi.open_scene(tmp_path, vehicle_from_world=vehicle_from_world).images) == 8
+
+
+def test_what_gaussians_do_they_do_here_too(made: vg.Reconstruction, tmp_path: Path) -> None:
+    ours = made.gaussians
+    theirs = capi.Gaussians.from_arrays(ours.means, ours.scales, ours.quats, ours.opacities, ours.sh)
+    # Unit quaternions are normalised again, which may move their last bit.
+    again = vg.Gaussians.from_arrays(ours.means, ours.scales, ours.quats, ours.opacities, ours.sh)
+    assert same_bytes(again, theirs)
+    matrix = looking_at_the_origin((3.0, 2.0, 1.0))
+    assert same_bytes(again.mirrored(), theirs.mirrored())
+    assert same_bytes(again.transformed(matrix), theirs.transformed(matrix))
+    assert same_bytes(again.merged(again), theirs.merged(theirs))
+    again.save_ply(tmp_path / "a.ply")
+    theirs.save_ply(tmp_path / "b.ply")
+    assert (tmp_path / "a.ply").read_bytes() == (tmp_path / "b.ply").read_bytes()
+    read = capi.Gaussians.load_ply(tmp_path / "a.ply")
+    assert same_bytes(vg.Gaussians.load_ply(tmp_path / "a.ply"), read)
+    assert repr(read) == f"Gaussians({len(again)}, sh_degree=2)"
+
+
+def test_arrays_are_read_only_and_outlive_the_gaussians(ellipsoid: Views) -> None:
+    made = capi.reconstruct(ellipsoid.images, ellipsoid.masks, ellipsoid.cameras, ellipsoid.depths)
+    means, sh = made.gaussians.means, made.gaussians.sh
+    assert means.ctypes.data == made.gaussians.means.ctypes.data
+    expected = means.copy(), sh.copy()
+    with pytest.raises(ValueError, match="read-only"):
+        means[0] = 0
+    with pytest.raises(ValueError, match="cannot set WRITEABLE"):
+        means.flags.writeable = True
+    del made
+    gc.collect()
+    junk = [np.full_like(sh, 7.0) for _ in range(8)]
+    np.testing.assert_array_equal(means, expected[0])
+    np.testing.assert_array_equal(sh, expected[1])
+    assert len(junk) == 8
+
+
+def test_handles_are_freed() -> None:
+    statm = Path("/proc/self/statm")
+    if not statm.exists():
+        pytest.skip("needs Linux's account of memory")
+
+    def resident_bytes() -> int:
+        return int(statm.read_text().split()[1]) * os.sysconf("SC_PAGESIZE")
+
+    n = 100_000
+    arrays = [np.ones((n, k), np.float32) for k in (3, 3, 4)]
+    for run in range(40):
+        if run == 5:
+            before = resident_bytes()
+        g = capi.Gaussians.from_arrays(*arrays, np.ones(n, np.float32), np.zeros((n, 16, 3), np.float32))
+        assert g.sh.shape == (n, 16, 3)
+        del g
+    assert resident_bytes() - before < 4 * n * 59 * 4
+
+
+def test_padded_rows_are_read_in_place_and_other_layouts_are_copied(ellipsoid: Views, made: vg.Reconstruction) -> None:
+    height, width = ellipsoid.images[0].shape[:2]
+    padded = [np.pad(i, ((0, 2), (0, 5), (0, 0)))[:height, :width] for i in ellipsoid.images]
+    flipped = [np.ascontiguousarray(m[::-1])[::-1] for m in ellipsoid.masks]
+    depths = [np.asfortranarray(d) for d in ellipsoid.depths]
+    alive: list[Any] = []
+    lent = capi._lent(padded[0], capi.Format.RGB8, alive)
+    assert lent.data == padded[0].ctypes.data and lent.row_stride == padded[0].strides[0] > 3 * width
+    made_here = capi.reconstruct(padded, flipped, ellipsoid.cameras, depths)
+    assert same_bytes(made_here.gaussians, made.gaussians)
+
+
+def test_a_context_is_shared_between_calls_and_threads(ellipsoid: Views, made: vg.Reconstruction) -> None:
+    context = capi.Context(threads=2)
+    assert context.threads == 2
+    car = capi.reconstruct(
+        ellipsoid.images, ellipsoid.masks, ellipsoid.cameras, ellipsoid.depths, context=context
+    ).gaussians
+    expected = made.gaussians.render(ellipsoid.cameras[0])
+    pictures: list[Any] = []
+    callers = [
+        threading.Thread(target=lambda: pictures.append(car.render(ellipsoid.cameras[0], context=context)))
+        for _ in range(4)
+    ]
+    for caller in callers:
+        caller.start()
+    for caller in callers:
+        caller.join()
+    assert len(pictures) == 4 and all((p == expected).all() for p in pictures)
+
+
+def test_progress_cancels_logs_and_passes_exceptions_through(ellipsoid: Views) -> None:
+    views = (ellipsoid.images, ellipsoid.masks, ellipsoid.cameras)
+    stages: list[str] = []
+    lines: list[tuple[capi.LogLevel, str]] = []
+
+    def cancel(stage: str, fraction: float) -> bool:
+        stages.append(stage)
+        return stage == "head"
+
+    with pytest.raises(vg.VgError, match="cancelled during head") as caught:
+        capi.reconstruct(*views, progress=cancel, log=lambda level, line: lines.append((level, line)))
+    assert caught.value.code is Status.CANCELLED
+    assert stages[0] == "plan" and stages[-1] == "head"
+
+    def fail(stage: str, fraction: float) -> None:
+        raise RuntimeError("mine")
+
+    with pytest.raises(RuntimeError, match="mine"):
+        capi.reconstruct(*views, progress=fail)
+    capi.reconstruct(*views, log=lambda level, line: lines.append((level, line)))
+    assert any(level is capi.LogLevel.INFO for level, _ in lines)
+
+
+def test_ctrl_c_stops_a_reconstruction_through_ctypes() -> None:
+    code = f"""
+from vehicle_gaussians import capi
+scene = capi.open_scene({str(SEDAN)!r}, load_depth=False)
+context = capi.Context(1)
+print("ready", flush=True)
+while True:
+    capi.reconstruct(scene.images, scene.masks, scene.cameras, context=context)
+"""
+    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    with child:
+        assert child.stdout is not None and child.stdout.readline() == "ready\n"
+        with pytest.raises(subprocess.TimeoutExpired):
+            child.wait(0.2)
+        child.send_signal(signal.SIGINT)
+        try:
+            _, errors = child.communicate(timeout=30)
+        finally:
+            child.kill()
+    assert child.returncode == -signal.SIGINT
+    assert errors.strip().endswith("KeyboardInterrupt")
+
+
+def test_poses_and_cameras_are_those_of_the_extension_module() -> None:
+    pose = looking_at_the_origin((5.0, -4.0, 1.0))
+    world = 2.0 * looking_at_the_origin((1.0, 2.0, 3.0))
+    world[3] = [0, 0, 0, 1]
+    q, t = [0.9, 0.1, -0.2, 0.3], [1.0, 2.0, 3.0]
+    for similarity in (None, world):
+        np.testing.assert_array_equal(capi.pose_from_colmap(q, t, similarity), vg.pose_from_colmap(q, t, similarity))
+        np.testing.assert_array_equal(capi.pose_from_opengl(pose, similarity), vg.pose_from_opengl(pose, similarity))
+    np.testing.assert_array_equal(
+        capi.pose_from_box(world / 2 + np.diag([0, 0, 0, 0.5]), pose),
+        vg.pose_from_box(world / 2 + np.diag([0, 0, 0, 0.5]), pose),
+    )
+    K = [[600, 0, 319.5], [0, 610, 239.5], [0, 0, 1]]
+    bent = capi.camera_from_opencv(K, pose, 640, 480, [0.1, 0.2, 0.3, 0.4, 0.5])
+    expected = vg.Camera.from_opencv(K, pose, 640, 480, [0.1, 0.2, 0.3, 0.4, 0.5])
+    assert bent.model == capi.CameraModel[expected.model]
+    np.testing.assert_array_equal(bent.params[: len(expected.params)], expected.params)
+    fisheye = capi.camera_from_opencv(K, pose, 640, 480, [0.1] * 4, fisheye=True)
+    assert fisheye.model == capi.CameraModel.OPENCV_FISHEYE
+    part = capi.vg_camera()
+    capi._call("vg_camera_crop", ct.byref(bent), 10, 20, 30, 40, ct.byref(part))
+    assert (part.width, part.height, part.params[2]) == (30, 40, 310.0)
+    capi._call("vg_camera_scale", ct.byref(bent), 320, 240, ct.byref(part))
+    assert (part.width, part.params[0]) == (320, 300.0)
+    point, pixel = np.zeros(3), np.zeros(2)
+    capi._call("vg_camera_project", ct.byref(bent), point.ctypes.data, pixel.ctypes.data)
+    np.testing.assert_allclose(pixel, [320, 240], atol=1e-9)
+
+
+def test_figures_are_those_of_the_report(ellipsoid: Views) -> None:
+    views = (capi.vg_view * 4)()
+    alive: list[Any] = []
+    for i in range(4):
+        views[i] = capi._initial(capi.vg_view)
+        views[i].camera = capi._camera(ellipsoid.cameras[i])
+        views[i].image = capi._photograph(ellipsoid.images[i], "image", alive)
+        views[i].mask = capi._mask(ellipsoid.masks[i], "mask", alive)
+    car, report = ct.c_void_p(), ct.c_void_p()
+    capi._call("vg_reconstruct", views, 4, None, ct.byref(car), ct.byref(report))
+    figures = capi._initial(capi.vg_report_figures)
+    capi._call("vg_report_get_figures", report, ct.byref(figures))
+    assert figures.gaussian_count == capi.library.vg_gaussians_count(car)
+    assert (figures.views_used, figures.prior, figures.has_input_error) == (4, capi.Prior.HULL, 1)
+    assert 1.5 < figures.extent_high[1] - figures.extent_low[1] < 2.1
+    capi.library.vg_report_free(report)
+    capi.library.vg_gaussians_free(car)
+
+
+def test_errors_have_the_same_codes_and_texts(ellipsoid: Views, tmp_path: Path) -> None:
+    with pytest.raises(vg.VgError, match="no.ply") as caught:
+        capi.Gaussians.load_ply(tmp_path / "no.ply")
+    assert caught.value.code is Status.IO
+    with pytest.raises(TypeError, match=r"^images\[0\]: array of float32; allowed: a NumPy array of uint8"):
+        capi.reconstruct([np.zeros((4, 4, 3), np.float32)], None, ellipsoid.cameras[:1])
+    with pytest.raises(TypeError, match=r"^depths\[0\]: array of float64"):
+        capi.reconstruct(ellipsoid.images[:1], None, ellipsoid.cameras[:1], [np.zeros((72, 96))])
+    with pytest.raises(TypeError, match="^camera: ndarray"):
+        capi.reconstruct(ellipsoid.images[:1], None, [np.eye(4)])
+    refused: list[tuple[dict[str, Any], str]] = [
+        ({"prior": "best"}, "prior: 'best'; allowed: auto, given, hull, onnx"),
+        ({"masks": []}, "masks: 0 entries; allowed: 4, one per image"),
+        ({"sh_degree": 4}, "options.sh_degree: 4"),
+        ({"masks": [np.zeros((5, 5), np.uint8)] * 4}, "views[0] (000).mask: 5x5"),
+        ({"keep": 64}, "options.keep"),
+    ]
+    for options, message in refused:
+        views: dict[str, Any] = {"images": ellipsoid.images, "masks": ellipsoid.masks, "cameras": ellipsoid.cameras}
+        with pytest.raises(vg.VgError, match="^" + re.escape(message)) as caught:
+            capi.reconstruct(**{**views, **options})
+        assert caught.value.code is Status.ARGUMENT
+    with pytest.raises(vg.VgError) as caught:
+        capi.reconstruct(ellipsoid.images, ellipsoid.masks, ellipsoid.cameras, prior="onnx")
+    assert caught.value.code is Status.NOT_BUILT
+
+
+def test_a_status_nobody_knows_yet_is_an_internal_error() -> None:
+    assert vg.VgError(99, "from the future").code is Status.INTERNAL
+
+
+def import_with(library: str | Path) -> str:
+    ran = subprocess.run(
+        [sys.executable, "-c", "import vehicle_gaussians.capi"],
+        env={**os.environ, "VG_LIBRARY": str(library)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert ran.returncode == 1
+    return ran.stderr.strip().splitlines()[-1]
+
+
+def test_a_library_that_is_missing_or_none_or_of_another_abi_is_an_import_error_with_hints(tmp_path: Path) -> None:
+    said = import_with("/no/such/libvg.so")
+    assert said.startswith("ImportError: /no/such/libvg.so: there is no such library. VG_LIBRARY names it. Hints: ")
+    (tmp_path / "text.so").write_text("not a library")
+    assert "cannot be loaded" in import_with(tmp_path / "text.so")
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler")
+
+    def library(name: str, source: str) -> Path:
+        (tmp_path / f"{name}.c").write_text(source)
+        subprocess.run([compiler, "-shared", "-fPIC", tmp_path / f"{name}.c", "-o", tmp_path / name], check=True)
+        return tmp_path / name
+
+    assert "not a libvg: it has no vg_abi_version" in import_with(library("other.so", "int other(void) { return 0; }"))
+    future = library("future.so", "unsigned vg_abi_version(void) { return 7; }")
+    assert "has binary interface 7; this module needs 0" in import_with(future)
+    past = library("past.so", "unsigned vg_abi_version(void) { return 0; }")
+    assert "older than this module: it has no vg_version, " in import_with(past)
+
+
+def test_the_environment_variable_names_the_library(tmp_path: Path) -> None:
+    copy = tmp_path / "elsewhere.so"
+    shutil.copyfile(capi.library_path(), copy)
+    code = "from vehicle_gaussians import capi; print(capi.library_path(), capi.library._name, capi.version())"
+    ran = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "VG_LIBRARY": str(copy)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    assert ran.stdout.split() == [str(copy), str(copy), vg.__version__]

@@ -1,0 +1,73 @@
+"""The package itself: versions, what the wheel holds, types."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tomllib
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+import vehicle_gaussians as vg
+from conftest import REPOSITORY
+from vehicle_gaussians import capi
+
+PACKAGE = Path(vg.__file__).parent
+BINDINGS = REPOSITORY / "bindings" / "python"
+
+
+def test_the_version_is_that_of_the_library() -> None:
+    library = tomllib.loads((REPOSITORY / "Cargo.toml").read_text())["package"]["version"]
+    assert vg.__version__ == metadata.version("vehicle-gaussians") == library
+
+
+def test_both_lock_files_hold_the_same_versions() -> None:
+    def versions(path: Path) -> dict[str, set[str]]:
+        found: dict[str, set[str]] = {}
+        for package in tomllib.loads(path.read_text())["package"]:
+            found.setdefault(package["name"], set()).add(package["version"])
+        return found
+
+    library, ours = versions(REPOSITORY / "Cargo.lock"), versions(BINDINGS / "Cargo.lock")
+    differ = {name: (v, library[name]) for name, v in ours.items() if name in library and not v <= library[name]}
+    assert not differ, "copy the library's Cargo.lock here and run cargo metadata"
+
+
+def test_the_package_holds_the_c_library_types_and_licences() -> None:
+    assert (PACKAGE / "py.typed").is_file()
+    assert [file.name for file in (PACKAGE / "lib").iterdir()] == [capi.library_path().name]
+    assert (PACKAGE / "include" / "vg.h").read_bytes() == (REPOSITORY / "include" / "vg.h").read_bytes()
+    files = {str(file) for file in metadata.files("vehicle-gaussians") or ()}
+    for licence in ("LICENSE-MIT", "LICENSE-APACHE", "LICENSES-THIRD-PARTY"):
+        assert any(file.endswith(f"licenses/{licence}") for file in files)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="sonames are ELF's")
+def test_only_the_c_library_is_called_libvg() -> None:
+    # A program in the same process that needs libvg.so.0 would be given the extension module instead.
+    native = Path(vg._native.__file__).read_bytes()
+    assert b"libvg.so.0" not in native and b"libvg.so.0" in capi.library_path().read_bytes()
+
+
+def test_everything_public_has_a_docstring() -> None:
+    for name in vg.__all__:
+        thing = getattr(vg, name)
+        assert name == "__version__" or (thing.__doc__ or "").strip(), name
+        for member in () if not isinstance(thing, type) or not thing.__module__.startswith("vehicle") else vars(thing):
+            if not member.startswith("_") and callable(getattr(thing, member)):
+                assert (getattr(thing, member).__doc__ or "").strip(), f"{name}.{member}"
+
+
+def test_types_are_complete_and_true() -> None:
+    pytest.importorskip("mypy")
+    checks = [
+        ["mypy"],
+        ["mypy.stubtest", "vehicle_gaussians", "--allowlist", "tests/stubtest-allowlist.txt"],
+    ]
+    for check in checks:
+        ran = subprocess.run(
+            [sys.executable, "-m", *check], cwd=BINDINGS, capture_output=True, text=True, timeout=300, check=False
+        )
+        assert ran.returncode == 0, ran.stdout + ran.stderr
