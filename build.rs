@@ -8,6 +8,8 @@ fn main() {
             // Not `rustc-cdylib-link-arg`: that one is passed on to the shared objects of crates that use this one, and
             // they would be called libvg.so.0 too.
             println!("cargo::rustc-link-arg=-Wl,-soname,libvg.so.0");
+            // The program is a library to nobody.
+            println!("cargo::rustc-link-arg-bins=-Wl,-soname=");
         }
         "macos" => println!("cargo::rustc-cdylib-link-arg=-Wl,-install_name,@rpath/libvg.0.dylib"),
         _ => {}

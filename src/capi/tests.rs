@@ -72,6 +72,45 @@ fn rust_sees_the_golden_layout() {
     }
 }
 
+/// Every enumerator with its number, named as C names it.
+fn numbers_of_rust() -> BTreeSet<String> {
+    let mut lines = BTreeSet::new();
+    let mut note = |prefix: &str, variant: &str, number: i32| {
+        let word = |(i, c): (usize, char)| match c.is_ascii_uppercase() && i > 0 {
+            true => format!("_{c}"),
+            false => c.to_ascii_uppercase().to_string(),
+        };
+        let name: String = variant.chars().enumerate().map(word).collect();
+        lines.insert(format!("{}_{name} = {number}", prefix.to_ascii_uppercase()));
+    };
+    macro_rules! number {
+        ($($name:ident { $($variant:ident)* })*) => {
+            $( $( note(stringify!($name), stringify!($variant), $name::$variant as i32); )* )*
+        };
+    }
+    number! {
+        vg_alpha { Straight Premultiplied }
+        vg_backend { Auto Cpu Gpu }
+        vg_background { Color Transparent }
+        vg_camera_model { SimplePinhole Pinhole SimpleRadial Radial Opencv OpencvFisheye FullOpencv }
+        vg_depth_mode { Expected Accumulated }
+        vg_format { Rgb8 Bgr8 Rgba8 Bgra8 Gray8 Rgba32f Depth32f }
+        vg_keep { DuplicateViews Overlap SilhouetteEdge Floaters ShBands }
+        vg_log_level { Warning Info Debug }
+        vg_prior { Auto Given Hull Onnx }
+        vg_status { Ok Argument Format Io Reconstruction Cancelled NotBuilt Internal }
+        vg_symmetry { Auto Always Never }
+    }
+    lines
+}
+
+#[test]
+fn rust_has_the_golden_numbers() {
+    let golden = std::fs::read_to_string(tools::golden().join("layout_x86_64.txt")).unwrap();
+    let golden: BTreeSet<String> = golden.lines().filter(|l| l.contains(" = ")).map(str::to_owned).collect();
+    assert_eq!(numbers_of_rust(), golden);
+}
+
 /// Names every struct, so that safer-ffi writes them all into its header.
 #[safer_ffi::ffi_export]
 fn vg_abi_witness(

@@ -23,6 +23,11 @@ struct Buffers {
     depth: Vec<f32>,
 }
 
+/// The processor path that exact bytes depend on.
+pub(crate) fn processor() -> String {
+    format!("{} {}", std::env::consts::ARCH, CpuRenderer::new().level())
+}
+
 /// FNV-1a.
 fn hash(values: &[f32]) -> u64 {
     let bytes = values.iter().flat_map(|v| v.to_le_bytes());
@@ -118,6 +123,14 @@ fn packed(buffers: &Buffers) -> Vec<u8> {
     bytes
 }
 
+fn hashes(buffers: &Buffers) -> String {
+    let names = ["positions", "scales", "rotations", "opacities", "sh", "picture", "depth"];
+    let arrays = buffers.arrays.iter().map(|(values, _)| values);
+    let values = arrays.chain([&buffers.picture, &buffers.depth]);
+    let lines = names.iter().zip(values).map(|(name, values)| format!("{name} {:016x}\n", hash(values)));
+    processor() + "\n" + &lines.collect::<String>()
+}
+
 fn numbers(bytes: &[u8]) -> Vec<f32> {
     bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect()
 }
@@ -127,19 +140,7 @@ fn the_sample_gives_the_golden_buffers() {
     let buffers = unsafe { made_of_the_sample() };
     let found = packed(&buffers);
     let path = golden().join("sedan.bin");
-    let hashes: String =
-        std::iter::once(format!("{} {}\n", std::env::consts::ARCH, CpuRenderer::new().level()))
-            .chain(
-                ["positions", "scales", "rotations", "opacities", "sh"]
-                    .iter()
-                    .zip(&buffers.arrays)
-                    .map(|(name, (values, _))| format!("{name} {:016x}\n", hash(values))),
-            )
-            .chain([
-                format!("picture {:016x}\n", hash(&buffers.picture)),
-                format!("depth {:016x}\n", hash(&buffers.depth)),
-            ])
-            .collect();
+    let hashes = hashes(&buffers);
     if std::env::var_os("VG_BLESS").is_some() {
         std::fs::write(&path, &found).unwrap();
         std::fs::write(golden().join("sedan.hash"), &hashes).unwrap();

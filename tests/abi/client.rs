@@ -101,6 +101,15 @@ fn the_client_compiles_clean_as_c_and_as_cxx_and_prints_the_same_with_the_static
     command.arg("-I").arg(&include).arg(&source).arg(target().join("libvg.a")).arg("-o").arg(&static_program);
     run(command.args(["-lm", "-lpthread", "-ldl"]));
     assert_eq!(as_c, run_client(&static_program, folder.path()));
+
+    // "positions 2416776 df54cfba06529b5e": what Rust has, by the golden hashes.
+    let golden = std::fs::read_to_string(crate::tools::golden().join("sedan.hash")).unwrap();
+    if golden.lines().next() == Some(&crate::buffers::processor()) {
+        for array in golden.lines().skip(1).take(5) {
+            let (name, hash) = array.split_once(' ').unwrap();
+            assert!(as_c.lines().any(|l| l.starts_with(name) && l.ends_with(hash)), "{array} not in {as_c}");
+        }
+    }
 }
 
 #[test]
