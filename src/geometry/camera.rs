@@ -399,6 +399,18 @@ mod tests {
     }
 
     #[test]
+    fn a_camera_from_where_nothing_can_be_lifted_is_refused() {
+        let at = |x: f64| {
+            let vehicle_from_camera = Pose { translation: DVec3::new(0.0, x, 0.0), ..Pose::IDENTITY };
+            Camera { vehicle_from_camera, ..camera() }
+        };
+        assert!(at(1e12).validate("camera").is_ok() && at(-1e12).validate("camera").is_ok());
+        for x in [1.1e12, -1e39, f64::NAN] {
+            refused(at(x).validate("camera").map(|()| at(x)), "camera.vehicle_from_camera: ");
+        }
+    }
+
+    #[test]
     fn a_crop_that_is_empty_or_leaves_the_picture_is_refused() {
         for (x, y, width, height) in [
             (0, 0, 0, 10),

@@ -1093,11 +1093,16 @@ fn many_threads_in_one_context_get_the_same_bytes() {
     // The world is handles, which any number of threads may use.
     struct Shared<'a>(&'a World);
     unsafe impl Sync for Shared<'_> {}
+    impl Shared<'_> {
+        fn world(&self) -> &World {
+            self.0
+        }
+    }
     let shared = Shared(world);
     std::thread::scope(|scope| {
         for _ in 0..8 {
             scope.spawn(|| {
-                let Shared(world) = *&shared;
+                let world = shared.world();
                 for _ in 0..3 {
                     let done = calls::reconstruct(world).run(true);
                     assert_eq!(bytes(done.handle("out_gaussians")), expected);
@@ -1175,10 +1180,16 @@ fn threads_end_with_their_context_or_call() {
     assert!(said.contains("1 passed"), "{said}");
 }
 
+/// What an uninitialised variable may hold.
+fn garbage<T>() -> *mut T {
+    std::ptr::without_provenance_mut(0xDEAD_BEE0)
+}
+
 #[test]
 fn handles_of_failed_calls_are_null_and_made_ones_are_freed() {
     // `Call::run` hands in a pointer to nowhere; here, what a caller has in its variable.
-    let (mut gaussians, mut report, mut error) = (1usize as *mut _, 2usize as *mut _, 3usize as *mut _);
+    let (mut gaussians, mut report, mut error) =
+        (garbage::<vg_gaussians>(), garbage::<vg_report>(), garbage::<vg_error>());
     unsafe {
         let status = vg_reconstruct(null(), 1, null(), &raw mut gaussians, &raw mut report, &raw mut error);
         assert_eq!(status, vg_status::Argument);
