@@ -96,7 +96,8 @@ pub unsafe extern "C" fn vg_context_new(
             read::not_null("out", out, "where to put the context")?;
             let options = read::optional("options", options)?;
             read::zero("options.flags", options.flags == 0)?;
-            let workshop = Workshop::new(options.threads as usize)?;
+            let workshop = Workshop::new(options.threads as usize)
+                .map_err(|e| read::renamed(e, &[("threads", "options.threads")]))?;
             out.write(Box::into_raw(Box::new(workshop)).cast());
             Ok(())
         })

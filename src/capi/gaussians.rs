@@ -20,6 +20,15 @@ pub struct vg_gaussians {
 /// Most Gaussians one handle holds.
 const MAX_COUNT: usize = i32::MAX as usize;
 
+/// What the library and C call the arrays.
+const ARRAYS: [(&str, &str); 5] = [
+    ("means", "arrays.positions"),
+    ("scales", "arrays.scales"),
+    ("rotations", "arrays.rotations"),
+    ("opacities", "arrays.opacities"),
+    ("sh", "arrays.sh"),
+];
+
 pub(super) fn into_raw(gaussians: Gaussians) -> *mut vg_gaussians {
     Box::into_raw(Box::new(gaussians)).cast()
 }
@@ -210,6 +219,7 @@ pub unsafe extern "C" fn vg_gaussians_from_arrays(
                 opacities.to_vec(),
                 sh.to_vec(),
             )
+            .map_err(|e| read::renamed(e, &ARRAYS))
         })
     }
 }

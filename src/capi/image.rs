@@ -130,13 +130,15 @@ pub(super) unsafe fn depth(argument: &str, image: &vg_image) -> Result<Option<De
 
 /// All bytes from the first to the last pixel, and the stride, after checking that they can be counted.
 unsafe fn bytes<'a>(argument: &str, image: &vg_image, pixel: usize) -> Result<(&'a [u8], usize)> {
-    let (len, stride) = extent(argument, image.width, image.height, image.row_stride, pixel)?;
+    let (len, stride) = extent(argument, ".row_stride", image.width, image.height, image.row_stride, pixel)?;
     Ok((unsafe { std::slice::from_raw_parts(image.data.cast(), len) }, stride))
 }
 
-/// Bytes from the first pixel to the end of the last, and the stride, of a picture of such a size.
+/// Bytes from the first pixel to the end of the last, and the stride, of a picture of such a size. In errors, the
+/// stride is the picture's name and `stride_name` behind it.
 pub(super) fn extent(
     argument: &str,
+    stride_name: &str,
     width: u32,
     height: u32,
     row_stride: usize,
@@ -156,7 +158,7 @@ pub(super) fn extent(
     match len.filter(|&n| stride >= row && isize::try_from(n).is_ok()) {
         Some(len) => Ok((len, stride)),
         None => Err(Error::argument(
-            format!("{argument}.row_stride"),
+            format!("{argument}{stride_name}"),
             format!("{row_stride} bytes"),
             format!(
                 "0, or at least {row} bytes for {width} pixels of {pixel}, and {height} rows that fit into memory"

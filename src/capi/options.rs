@@ -3,7 +3,7 @@
 use super::context::vg_context;
 use super::guard::guarded;
 use super::read::{self, Versioned};
-use super::status::vg_status;
+use super::status::{c_string, one_line, vg_status};
 use crate::error::{Error, Result};
 use crate::pipeline::{Keep, Options, PriorChoice};
 use crate::symmetry::SymmetryMode;
@@ -192,7 +192,7 @@ pub(super) struct Log {
 impl Log {
     pub(super) unsafe fn line(self, level: vg_log_level, line: impl FnOnce() -> String) {
         if let Some(callback) = self.callback {
-            let text: CString = super::status::c_string(line());
+            let text: CString = c_string(one_line(&line()));
             unsafe { callback(level as i32, text.as_ptr(), self.user) };
         }
     }

@@ -213,6 +213,16 @@ pub(super) fn flag(argument: &str, number: i32) -> Result<bool> {
     choice(argument, number, &[(0, "no", false), (1, "yes", true)])
 }
 
+/// The error of a function that calls its argument or field `from`, for callers who know it as `to`.
+pub(super) fn renamed(error: Error, names: &[(&str, &str)]) -> Error {
+    let Error::Argument { argument, found, allowed } = error else { return error };
+    let known = names.iter().find_map(|(from, to)| {
+        let rest = argument.strip_prefix(from)?;
+        (rest.is_empty() || rest.starts_with('[')).then(|| format!("{to}{rest}"))
+    });
+    Error::Argument { argument: known.unwrap_or(argument), found, allowed }
+}
+
 /// A field kept for later.
 pub(super) fn zero(argument: &str, is_zero: bool) -> Result<()> {
     if is_zero { Ok(()) } else { Err(Error::argument(argument, "not zero", "zero: reserved")) }

@@ -41,9 +41,11 @@ pub unsafe extern "C" fn vg_reconstruct(
             let settings = options.to_options()?;
             let scene = view::scene(views, view_count)?;
             let made = in_context(options.context, |shop| run(shop, &scene, &settings, &options))?;
+            // Nothing can fail any more once the first handle is out.
+            let report = (!out_report.is_null()).then(|| ReportObject::new(made.report, made.points));
             out_gaussians.write(gaussians::into_raw(made.gaussians));
-            if !out_report.is_null() {
-                out_report.write(ReportObject::new(made.report, made.points).into_raw());
+            if let Some(report) = report {
+                out_report.write(report.into_raw());
             }
             Ok(())
         })

@@ -243,7 +243,12 @@ impl vg_render_options {
             sh_degree: sh_degree("options.sh_degree", self.sh_degree)?,
             depth_mode: read::choice("options.depth_mode", self.depth_mode, &depth_modes)?,
         };
-        settings.validate()?;
+        let names = [
+            ("options.background", "options.background_color"),
+            ("options.near", "options.near_plane"),
+            ("options.far", "options.far_plane"),
+        ];
+        settings.validate().map_err(|e| read::renamed(e, &names))?;
         Ok((settings, read::choice("options.alpha", self.alpha, &alphas)?))
     }
 }
@@ -305,8 +310,14 @@ impl Target {
             true => None,
             false => {
                 let layout = layout(target.color_format, opaque)?;
-                let (_, stride) =
-                    extent("target.color", width, height, target.color_row_stride, layout.bytes())?;
+                let (_, stride) = extent(
+                    "target.color",
+                    "_row_stride",
+                    width,
+                    height,
+                    target.color_row_stride,
+                    layout.bytes(),
+                )?;
                 Some((target.color.cast(), stride, Pixel { layout, opaque, alpha }))
             }
         };
@@ -314,7 +325,8 @@ impl Target {
             true => None,
             false => {
                 let bytes = size_of::<f32>();
-                let (_, stride) = extent("target.depth", width, height, target.depth_row_stride, bytes)?;
+                let (_, stride) =
+                    extent("target.depth", "_row_stride", width, height, target.depth_row_stride, bytes)?;
                 Some((target.depth.cast(), stride))
             }
         };

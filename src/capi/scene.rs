@@ -127,10 +127,14 @@ unsafe fn open(
         guarded(out_error, || {
             read::not_null("out", out, "where to put the scene")?;
             let path = read::path("path", path)?;
-            let options = read::optional("options", options)?;
+            let options = match format {
+                SceneFormat::Colmap => read::required("options", options)?,
+                SceneFormat::Transforms => read::optional("options", options)?,
+            };
             let wanted = SceneOptions { format: Some(format), ..options.read()? };
             let open = |shop: &Workshop| shop.threads.run(|| io::open_scene(path, &wanted));
-            let files = in_context(options.context, open)?;
+            let files = in_context(options.context, open)
+                .map_err(|e| read::renamed(e, &[("depth_scale", "options.depth_scale")]))?;
             let log = Log { callback: options.log, user: options.log_user };
             for note in files.notes {
                 log.line(vg_log_level::Warning, || note);

@@ -47,7 +47,7 @@ impl vg_error {
             Failure::Panicked(message) => (vg_status::Internal, message),
             Failure::Refused(error) => (status_of(&error), error.to_string()),
         };
-        ErrorObject { status, message: c_string(message) }
+        ErrorObject { status, message: c_string(one_line(&message)) }
     }
 }
 
@@ -71,6 +71,15 @@ pub(crate) fn status_of(error: &Error) -> vg_status {
         Error::Cancelled { .. } => vg_status::Cancelled,
         Error::NotBuilt { .. } => vg_status::NotBuilt,
     }
+}
+
+/// A message on one line: it may quote a name or a path that has several, and a panic's has.
+pub(super) fn one_line(text: &str) -> String {
+    let escaped = |c: char| match c.is_control() {
+        true => c.escape_default().collect::<String>(),
+        false => c.into(),
+    };
+    text.chars().map(escaped).collect()
 }
 
 /// Text for C; a NUL inside, which a message may quote, becomes U+FFFD.

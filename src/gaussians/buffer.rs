@@ -36,6 +36,14 @@ pub struct Gaussian {
     pub sh0: [f32; 3],
 }
 
+impl Gaussian {
+    /// Whether it meets the invariants of [`Gaussians`], its rotation's norm aside.
+    pub fn is_storable(&self) -> bool {
+        self.mean.iter().chain(&self.rotation).chain(&self.sh0).all(|v| v.is_finite())
+            && self.scale.iter().all(|v| SCALE_RANGE.contains(v))
+    }
+}
+
 /// All but the opacities: what mirroring and moving change, keeping the invariants.
 pub(super) struct MovedArrays<'a> {
     pub(super) means: &'a mut [[f32; 3]],
@@ -131,8 +139,7 @@ impl Gaussians {
 
     /// Appends one Gaussian that meets the invariants; bands above degree 0 become zero.
     pub fn push(&mut self, g: &Gaussian) {
-        debug_assert!(g.mean.iter().chain(&g.rotation).chain(&g.sh0).all(|v| v.is_finite()), "{g:?}");
-        debug_assert!(g.scale.iter().all(|v| SCALE_RANGE.contains(v)), "{g:?}");
+        debug_assert!(g.is_storable(), "{g:?}");
         self.means.push(g.mean);
         self.rotations.push(g.rotation);
         self.scales.push(g.scale);

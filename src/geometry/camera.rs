@@ -208,7 +208,7 @@ impl Camera {
         Ok(camera)
     }
 
-    /// Size 1 to [`MAX_SIDE`], focal lengths positive, everything finite; `argument` names it in the error.
+    /// Size 1 to [`MAX_SIDE`], focal lengths positive, everything finite and not too far away; `argument` names it in the error.
     pub fn validate(&self, argument: &str) -> Result<()> {
         let Self { width, height, intrinsics: Intrinsics { fx, fy, cx, cy }, .. } = *self;
         if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
@@ -254,6 +254,15 @@ impl Camera {
                 format!("{argument}.vehicle_from_camera"),
                 "a NaN or infinite entry",
                 "finite numbers",
+            ));
+        }
+        // From farther away, what is lifted out of the picture leaves the range of f32.
+        const DISTANCE: f64 = 1e12;
+        if self.vehicle_from_camera.translation.abs().max_element() > DISTANCE {
+            return Err(Error::argument(
+                format!("{argument}.vehicle_from_camera"),
+                format!("at {}", self.vehicle_from_camera.translation),
+                "within 1e12 m of the origin",
             ));
         }
         Ok(())
@@ -387,6 +396,18 @@ mod tests {
         }
         assert_eq!(whole.cropped(0, 0, 640, 480).unwrap(), whole);
         assert!(whole.cropped(639, 479, 1, 1).is_ok());
+    }
+
+    #[test]
+    fn a_camera_from_where_nothing_can_be_lifted_is_refused() {
+        let at = |x: f64| {
+            let vehicle_from_camera = Pose { translation: DVec3::new(0.0, x, 0.0), ..Pose::IDENTITY };
+            Camera { vehicle_from_camera, ..camera() }
+        };
+        assert!(at(1e12).validate("camera").is_ok() && at(-1e12).validate("camera").is_ok());
+        for x in [1.1e12, -1e39, f64::NAN] {
+            refused(at(x).validate("camera").map(|()| at(x)), "camera.vehicle_from_camera: ");
+        }
     }
 
     #[test]

@@ -141,5 +141,6 @@ fn surfel(view: &View, geometry: &Geometry, i: usize, pixel: usize) -> Option<(G
         opacity: OPACITY,
         sh0: sh::from_rgb(view.image.pixels()[pixel].map(|c| f32::from(c) / 255.0)),
     };
-    Some((surfel, vehicle_from_camera * normal))
+    // Depth of 1e-40 m, or a principal point 1e9 px away, leave what a Gaussian can hold.
+    surfel.is_storable().then(|| (surfel, vehicle_from_camera * normal))
 }

@@ -1,1 +1,1205 @@
-//! What the functions do with NULL, zero, bad numbers and sizes.
+//! What the functions do with NULL, zero, bad numbers and sizes: a table of calls, each with one thing that is wrong
+//! or unusual. `calls` has the functions and their arguments; what holds for every call is checked there.
+#![allow(unsafe_code)]
+
+use crate::common::vehicle;
+use crate::symbols::declared;
+use crate::tools::{root, scratch};
+use calls::{Call, Done, FEW, Made, Memory, Outcome, Value, World, bits32, blank, bytes_of, text};
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeSet;
+use std::ffi::{CStr, CString, c_char, c_void};
+use std::ptr::{null, null_mut};
+use vg::capi::*;
+
+mod calls;
+
+/// Bytes on either side of everything that is lent.
+pub(crate) const GUARD: usize = 64;
+
+/// What a row expects.
+#[derive(Clone, Debug)]
+enum Expect {
+    Fine,
+    /// `VG_STATUS_ARGUMENT`, and these words.
+    Refused(String),
+    Fails(vg_status, String),
+}
+use Expect::{Fails, Fine};
+
+fn refused(words: &str) -> Expect {
+    Expect::Refused(words.into())
+}
+
+/// The rows and what they are run in.
+struct Table {
+    world: World,
+    rows: usize,
+    functions: BTreeSet<&'static str>,
+    _folder: tempfile::TempDir,
+}
+
+impl Table {
+    fn new() -> Self {
+        let folder = scratch();
+        let world = World::new(&root().join("tests/data/sedan"), folder.path());
+        Self { world, rows: 0, functions: BTreeSet::new(), _folder: folder }
+    }
+
+    /// Makes a call twice, with an `out_error` and without.
+    #[track_caller]
+    fn row(
+        &mut self,
+        make: fn(&World) -> Call,
+        what: &str,
+        tweak: impl Fn(&mut Call),
+        expect: Expect,
+    ) -> Done {
+        self.row_of(&|w| make(w), what, tweak, expect)
+    }
+
+    #[track_caller]
+    fn row_of(
+        &mut self,
+        make: &dyn Fn(&World) -> Call,
+        what: &str,
+        tweak: impl Fn(&mut Call),
+        expect: Expect,
+    ) -> Done {
+        let [done, without] = [true, false].map(|with_error| {
+            let mut call = make(&self.world);
+            tweak(&mut call);
+            self.functions.insert(call.function);
+            call.run(with_error)
+        });
+        self.rows += 1;
+        let function = make(&self.world).function;
+        let found = format!("{function}, {what}: {:?} {}", done.status, done.message);
+        let (status, words) = match expect {
+            Fine => (vg_status::Ok, String::new()),
+            Expect::Refused(words) => (vg_status::Argument, words),
+            Fails(status, words) => (status, words),
+        };
+        assert_eq!(done.status, status, "{found}");
+        assert_eq!(without.status, status, "{found}: another status without out_error");
+        // `_init` functions have no message.
+        let silent = function.ends_with("_init");
+        assert!(silent || done.message.contains(&words), "{found}: no \"{words}\"");
+        done
+    }
+
+    /// What can be said of any argument by its kind.
+    fn generic_rows(&mut self, make: fn(&World) -> Call) {
+        self.row(make, "as it is", |_| {}, Fine);
+        let valid = make(&self.world);
+        for (i, argument) in valid.arguments.iter().enumerate() {
+            let (name, word) = (argument.name, argument.word);
+            match &argument.value {
+                Value::Number(_) => {
+                    for &(bits, outcome) in &argument.tries {
+                        let what = format!("{name} {}", bits.cast_signed());
+                        let set = |call: &mut Call| call.arguments[i].value = Value::Number(bits);
+                        self.row(make, &what, set, expected(outcome, word.into()));
+                    }
+                    continue;
+                }
+                Value::Doubles(values) => {
+                    for (k, &(bits, outcome)) in
+                        (0..values.len()).flat_map(|k| argument.tries.iter().map(move |t| (k, t)))
+                    {
+                        let what = format!("{name}[{k}] = {}", f64::from_bits(bits));
+                        let set = |call: &mut Call| call.doubles(name)[k] = f64::from_bits(bits);
+                        self.row(make, &what, set, expected(outcome, word.into()));
+                    }
+                }
+                Value::Struct(_) => self.struct_rows(make, name),
+                Value::OutStruct(_) if SIZED.contains(&valid.function) => self.size_rows(make, name),
+                _ => {}
+            }
+            let expect = if argument.nullable { Fine } else { refused(name) };
+            self.row(make, &format!("{name} NULL"), |call| call.arguments[i].value = Value::Null, expect);
+        }
+    }
+
+    fn size_rows(&mut self, make: fn(&World) -> Call, name: &'static str) {
+        let lent = make(&self.world).lent(name).clone();
+        let element = if lent.is_array { format!("{name}[0]") } else { name.to_owned() };
+        let size = lent.stride;
+        let first = FIRST_SIZES.iter().find(|(of, _)| *of == lent.of).expect("a struct that says its size").1;
+        for short in [0, 1, 7, 8, first - 1] {
+            let expect = refused(&format!("{element}.struct_size"));
+            self.row(
+                make,
+                &format!("{name} of {short} bytes"),
+                |call| call.lent(name).resize(short, 0),
+                expect,
+            );
+        }
+        for (long, fill, expect) in [
+            (first, 0, Fine),
+            (size + 8, 0, Fine),
+            (size + 64, 0, Fine),
+            (4096, 0, Fine),
+            (size + 8, 1, if SIZED.contains(&make(&self.world).function) { Fine } else { refused(name) }),
+        ] {
+            let what = format!("{name} of {long} bytes, {fill} behind");
+            self.row(make, &what, |call| call.lent(name).resize(long, fill), expect);
+        }
+        for huge in [4097, usize::MAX / 2, usize::MAX] {
+            let expect = refused(&format!("{element}.struct_size"));
+            self.row(make, &format!("{name} says {huge}"), |call| call.lent(name).claim(0, huge), expect);
+        }
+        for shift in [1, 4] {
+            self.row(make, &format!("{name} off by {shift}"), |call| call.lent(name).shift = shift, Fine);
+        }
+    }
+
+    fn struct_rows(&mut self, make: fn(&World) -> Call, name: &'static str) {
+        self.size_rows(make, name);
+        let lent = make(&self.world).lent(name).clone();
+        let element = if lent.is_array { format!("{name}[0]") } else { name.to_owned() };
+        for field in &lent.fields {
+            for (k, &(bits, outcome)) in
+                (0..field.count).flat_map(|k| field.tries.iter().map(move |t| (k, t)))
+            {
+                let what = format!("{name}.{}[{k}] = {bits:#x}", field.name);
+                let words = [element.as_str(), field.word.as_str()].into_iter().filter(|w| !w.is_empty());
+                let words = words.collect::<Vec<_>>().join(".");
+                // `target.size` is called so in full.
+                let words = if field.word.starts_with(name) { field.word.clone() } else { words };
+                let set = |call: &mut Call| call.lent(name).put(&field.name, k, bits);
+                // Reserved numbers are told by their array.
+                self.row(make, &what, set, expected(outcome, words));
+            }
+        }
+    }
+}
+
+impl Drop for Table {
+    fn drop(&mut self) {
+        println!("{} rows", self.rows);
+    }
+}
+
+fn expected(outcome: Outcome, words: String) -> Expect {
+    match outcome {
+        Outcome::Fine => Fine,
+        Outcome::Refused => Expect::Refused(words),
+        Outcome::NotBuilt => Fails(vg_status::NotBuilt, words),
+    }
+}
+
+/// Functions that fill a struct as far as it says it goes.
+const SIZED: [&str; 2] = ["vg_report_get_figures", "vg_scene_get_view"];
+
+/// `sizeof` in the release that introduced them: no caller has shorter ones.
+const FIRST_SIZES: [(&str, usize); 9] = [
+    ("vg_context_options", 16),
+    ("vg_camera", 280),
+    ("vg_view", 392),
+    ("vg_options", 96),
+    ("vg_report_figures", 152),
+    ("vg_gaussian_arrays", 64),
+    ("vg_render_options", 72),
+    ("vg_image_target", 56),
+    ("vg_scene_options", 72),
+];
+
+/// Functions that cannot fail, all called by `what_cannot_fail_accepts_null`.
+const NEVER_FAIL: [&str; 22] = [
+    "vg_version",
+    "vg_abi_version",
+    "vg_error_code",
+    "vg_error_message",
+    "vg_error_free",
+    "vg_context_threads",
+    "vg_context_free",
+    "vg_report_json",
+    "vg_report_point_count",
+    "vg_report_point_positions",
+    "vg_report_point_colors",
+    "vg_report_free",
+    "vg_gaussians_count",
+    "vg_gaussians_sh_degree",
+    "vg_gaussians_positions",
+    "vg_gaussians_scales",
+    "vg_gaussians_rotations",
+    "vg_gaussians_opacities",
+    "vg_gaussians_sh",
+    "vg_gaussians_free",
+    "vg_scene_view_count",
+    "vg_scene_free",
+];
+
+#[test]
+fn every_argument_and_field_of_every_function_is_checked() {
+    let mut table = Table::new();
+    for make in calls::CALLS {
+        table.generic_rows(make);
+    }
+    let mut all: BTreeSet<String> = table.functions.iter().map(|&f| f.to_owned()).collect();
+    assert!(NEVER_FAIL.iter().all(|&f| all.insert(f.to_owned())));
+    assert_eq!(all, declared(), "the table has every function of the header");
+    assert!(table.rows > 1000, "{} rows", table.rows);
+}
+
+#[test]
+fn what_cannot_fail_accepts_null() {
+    unsafe {
+        assert_eq!(CStr::from_ptr(vg_version()).to_str(), Ok(env!("CARGO_PKG_VERSION")));
+        assert_eq!(vg_abi_version(), VG_ABI_VERSION);
+        assert_eq!(vg_error_code(null()), vg_status::Ok);
+        assert_eq!(CStr::from_ptr(vg_error_message(null())), c"");
+        assert_eq!(CStr::from_ptr(vg_report_json(null())), c"");
+        assert_eq!(vg_context_threads(null()), 0);
+        assert_eq!(vg_report_point_count(null()), 0);
+        assert!(vg_report_point_positions(null()).is_null() && vg_report_point_colors(null()).is_null());
+        assert_eq!((vg_gaussians_count(null()), vg_gaussians_sh_degree(null())), (0, 0));
+        for array in [
+            vg_gaussians_positions,
+            vg_gaussians_scales,
+            vg_gaussians_rotations,
+            vg_gaussians_opacities,
+            vg_gaussians_sh,
+        ] {
+            assert!(array(null()).is_null());
+        }
+        assert_eq!(vg_scene_view_count(null()), 0);
+        vg_error_free(null_mut());
+        vg_context_free(null_mut());
+        vg_report_free(null_mut());
+        vg_gaussians_free(null_mut());
+        vg_scene_free(null_mut());
+    }
+}
+
+#[test]
+fn init_functions_fill_what_they_are_told_and_nothing_beyond() {
+    let mut table = Table::new();
+    for make in calls::CALLS {
+        let valid = make(&table.world);
+        if !valid.function.ends_with("_init") {
+            continue;
+        }
+        let name = valid.arguments[0].name;
+        let Value::OutStruct(lent) = &valid.arguments[0].value else { panic!("a struct") };
+        let size = lent.stride;
+        let whole = table.row(make, "whole", |_| {}, Fine).memory[0].take().unwrap();
+        for (told, there) in [(size, size + 40), (size + 8, size + 40), (4096, 4096)] {
+            let tell = |call: &mut Call| {
+                call.lent(name).bytes = vec![calls::CANARY; there];
+                call.set("size", Value::Number(told as u64));
+            };
+            for shift in [0, 1] {
+                let shifted = |call: &mut Call| {
+                    tell(call);
+                    call.lent(name).shift = shift;
+                };
+                let mut done = table.row(make, &format!("size {told}"), shifted, Fine);
+                let memory = done.memory[0].take().unwrap();
+                let bytes = memory.content();
+                assert_eq!(bytes[..8], told.to_ne_bytes());
+                assert_eq!(bytes[8..size], whole.content()[8..]);
+                assert!(bytes[size..told].iter().all(|&b| b == 0), "what this library does not know is zero");
+                assert!(bytes[told..].iter().all(|&b| b == calls::CANARY), "written beyond {told} bytes");
+            }
+        }
+    }
+}
+
+/// Copies of [`IDENTITY`] that are no rotations.
+fn no_rotations() -> [[f64; 12]; 5] {
+    let change = |entries: &[(usize, f64)]| {
+        let mut pose = IDENTITY;
+        entries.iter().for_each(|&(i, v)| pose[i] = v);
+        pose
+    };
+    [
+        change(&[(5, -1.0)]),
+        change(&[(0, 2.0), (5, 2.0), (10, 2.0)]),
+        change(&[(1, 0.5)]),
+        change(&[(0, 0.0), (5, 0.0), (10, 0.0)]),
+        change(&[(0, 1e200), (5, 1e200), (10, 1e200)]),
+    ]
+}
+
+const IDENTITY: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+
+/// 4x4 matrices that are no similarities.
+fn no_similarities() -> Vec<[f64; 16]> {
+    let mut all: Vec<[f64; 16]> = Vec::new();
+    for pose in no_rotations() {
+        let mut matrix = [0.0; 16];
+        matrix[..12].copy_from_slice(&pose);
+        matrix[15] = 1.0;
+        // A scale is allowed.
+        if pose[0] != 2.0 && pose[0] != 1e200 {
+            all.push(matrix);
+        }
+    }
+    for (i, value) in [(12, 1e-9), (14, 1.0), (15, 0.0), (15, 2.0), (15, f64::NAN)] {
+        let mut matrix = [0.0; 16];
+        matrix[..12].copy_from_slice(&IDENTITY);
+        matrix[15] = 1.0;
+        matrix[i] = value;
+        all.push(matrix);
+    }
+    all
+}
+
+#[test]
+fn mirrors_scales_and_shears_are_no_poses() {
+    let mut table = Table::new();
+    for pose in no_rotations() {
+        let what = format!("pose {pose:?}");
+        for (make, name) in [
+            (calls::camera_from_colmap_model as fn(&World) -> Call, "vehicle_from_camera"),
+            (calls::camera_from_opencv, "vehicle_from_camera"),
+            (calls::pose_from_opengl, "camera_to_world"),
+            (calls::pose_from_box, "vehicle_in_ego"),
+            (calls::pose_from_box, "camera_in_ego"),
+        ] {
+            table.row(make, &what, |call| call.doubles(name).copy_from_slice(&pose), refused(name));
+        }
+        let put = |call: &mut Call, argument: &str, field: &str| {
+            for (k, value) in pose.iter().enumerate() {
+                call.lent(argument).put(field, k, value.to_bits());
+            }
+        };
+        for make in [calls::camera_scale as fn(&World) -> Call, calls::camera_project, calls::render] {
+            let words = refused("camera.vehicle_from_camera");
+            table.row(make, &what, |call| put(call, "camera", "vehicle_from_camera"), words);
+        }
+        let words = refused("views[0].camera.vehicle_from_camera");
+        table.row(calls::reconstruct, &what, |call| put(call, "views", "camera.vehicle_from_camera"), words);
+    }
+    for matrix in no_similarities() {
+        let what = format!("similarity {matrix:?}");
+        for (make, name) in [
+            (calls::pose_from_colmap as fn(&World) -> Call, "vehicle_from_world"),
+            (calls::pose_from_opengl, "vehicle_from_world"),
+            (calls::gaussians_transform, "to_from_vehicle"),
+        ] {
+            table.row(make, &what, |call| call.doubles(name).copy_from_slice(&matrix), refused(name));
+        }
+        for make in [calls::colmap_open as fn(&World) -> Call, calls::transforms_open] {
+            let point = |call: &mut Call| {
+                let mut memory = Memory::of(&matrix, 1);
+                call.lent("options").put("vehicle_from_world", 0, memory.pointer() as u64);
+                call.inputs.push(memory);
+            };
+            table.row(make, &what, point, refused("options.vehicle_from_world"));
+        }
+    }
+    // Written with three digits, and none at all.
+    table.row(calls::pose_from_opengl, "noise", |call| call.doubles("camera_to_world")[0] = 1e-3, Fine);
+    let zero = |call: &mut Call| call.doubles("qvec").fill(0.0);
+    table.row(calls::pose_from_colmap, "qvec 0", zero, refused("qvec"));
+}
+
+#[test]
+fn numbers_that_overflow_are_refused_and_not_handed_out() {
+    let mut table = Table::new();
+    let far = 1.7e308;
+    let tvec = |call: &mut Call| call.doubles("tvec").fill(far);
+    table.row(calls::pose_from_colmap, "far, then scaled", tvec, refused("pose"));
+    let world = |call: &mut Call| call.doubles("camera_to_world")[3] = far;
+    table.row(calls::pose_from_opengl, "far, then scaled", world, refused("pose"));
+    let apart = |call: &mut Call| {
+        call.doubles("vehicle_in_ego")[3] = far;
+        call.doubles("camera_in_ego")[3] = -far;
+    };
+    table.row(calls::pose_from_box, "far apart", apart, refused("pose"));
+
+    let point =
+        |values: [f64; 3]| move |call: &mut Call| call.doubles("point_vehicle").copy_from_slice(&values);
+    for values in [[far, far, far], [1e308, -1e308, 0.0], [1e300, 1e300, 1e300]] {
+        let mut call = calls::camera_project(&table.world);
+        point(values)(&mut call);
+        call.run(true);
+    }
+    // The camera looks from (distance cos, distance sin) at the middle: twice that is behind it.
+    table.row(calls::camera_project, "behind", point([10.0, -10.0, 1.6]), refused("point_vehicle"));
+    let at = vehicle::camera(-40.0, 6.5, 4, 4).center();
+    table.row(calls::camera_project, "on the plane", point(at.to_array()), refused("point_vehicle"));
+
+    // A float32 of 16 km does not resolve a millimetre.
+    let utm = |call: &mut Call| call.doubles("to_from_vehicle")[3] = 5e6;
+    table.row(calls::gaussians_transform, "UTM", utm, refused("to_from_vehicle"));
+    for scale in [1e-60, 1e12, 1e60] {
+        let matrix = |call: &mut Call| {
+            for k in [1, 4, 10] {
+                let sign = call.doubles("to_from_vehicle")[k].signum();
+                call.doubles("to_from_vehicle")[k] = sign * scale;
+            }
+        };
+        let expect = Fails(vg_status::Argument, String::new());
+        table.row(calls::gaussians_transform, &format!("scale {scale}"), matrix, expect);
+    }
+}
+
+#[test]
+fn cameras_of_every_model_are_read_with_as_many_numbers_as_the_model_has() {
+    let mut table = Table::new();
+    for (model, count) in [(0, 3), (1, 4), (2, 4), (3, 5), (4, 8), (5, 8), (6, 12)] {
+        let params: Vec<f64> = [50.0, 50.0, 24.0, 18.0].into_iter().chain([1e-3; 8]).take(count).collect();
+        let set = |call: &mut Call| {
+            call.set("model", Value::Number(model));
+            call.set("params", Value::Doubles(params.clone()));
+            call.set("param_count", Value::Number(count as u64));
+        };
+        table.row(calls::camera_from_colmap_model, &format!("model {model}"), set, Fine);
+        let in_struct = |extra: f64| {
+            let mut params = params.clone();
+            params.resize(16, 0.0);
+            if count < 16 {
+                params[count] = extra;
+            }
+            move |call: &mut Call| {
+                call.lent("camera").put("model", 0, model);
+                for (k, p) in params.iter().enumerate() {
+                    call.lent("camera").put("params", k, p.to_bits());
+                }
+            }
+        };
+        for make in [calls::camera_scale as fn(&World) -> Call, calls::render] {
+            table.row(make, &format!("model {model}"), in_struct(0.0), Fine);
+            let words = refused(&format!("camera.params[{count}]"));
+            table.row(make, &format!("model {model}, one more"), in_struct(1e-9), words);
+        }
+    }
+    for (k, value) in [(0, 0.0), (0, -50.0), (1, 1e-4), (1, 1e10), (2, 1e10), (3, -1e10)] {
+        let put = |call: &mut Call| call.lent("camera").put("params", k, f64::to_bits(value));
+        table.row(calls::camera_project, &format!("params[{k}] = {value}"), put, refused("camera."));
+    }
+    let inner =
+        |size: usize| move |call: &mut Call| call.lent("views").put("camera.struct_size", 0, size as u64);
+    for size in [0, 279, 288, usize::MAX] {
+        let words = refused("views[0].camera.struct_size");
+        table.row(calls::reconstruct, &format!("inner camera of {size} bytes"), inner(size), words);
+    }
+}
+
+#[test]
+fn distortion_comes_in_opencv_s_lengths() {
+    let mut table = Table::new();
+    for count in 0..16usize {
+        for fisheye in [0, 1] {
+            let mut values = vec![1e-3; count.min(8)];
+            values.resize(count, 0.0);
+            let set = |call: &mut Call| {
+                call.set("distortion", Value::Doubles(values.clone()));
+                call.set("distortion_count", Value::Number(count as u64));
+                call.set("fisheye", Value::Number(fisheye));
+            };
+            let allowed: &[usize] = if fisheye == 1 { &[0, 4] } else { &[0, 4, 5, 8, 12, 14] };
+            let expect = if allowed.contains(&count) { Fine } else { refused("distortion") };
+            table.row(calls::camera_from_opencv, &format!("{count} numbers"), set, expect);
+        }
+    }
+    let none = |call: &mut Call| {
+        call.set("distortion", Value::Null);
+        call.set("distortion_count", Value::Number(0));
+    };
+    table.row(calls::camera_from_opencv, "NULL and 0", none, Fine);
+    let tilted = |call: &mut Call| {
+        call.set("distortion", Value::Doubles([vec![0.0; 13], vec![1e-3]].concat()));
+        call.set("distortion_count", Value::Number(14));
+    };
+    table.row(calls::camera_from_opencv, "a tilted sensor", tilted, refused("distortion[13]"));
+    for count in [1usize << 60, usize::MAX / 8 + 1, usize::MAX] {
+        let set = |call: &mut Call| call.set("distortion_count", Value::Number(count as u64));
+        table.row(calls::camera_from_opencv, &format!("{count} numbers"), set, refused("distortion"));
+    }
+    for (k, value) in [(1, 0.3), (3, 1e-3), (6, 1.0), (8, 2.0), (0, -1.0), (4, 0.0)] {
+        table.row(
+            calls::camera_from_opencv,
+            &format!("k[{k}]"),
+            |call| call.doubles("k")[k] = value,
+            refused("camera"),
+        );
+    }
+    // `double *` that is none.
+    for (make, name) in [
+        (calls::camera_from_opencv as fn(&World) -> Call, "distortion"),
+        (calls::camera_from_colmap_model, "params"),
+    ] {
+        let odd = |call: &mut Call| {
+            let mut memory = Memory::of(&[50.0f64, 50.0, 24.0, 18.0], 4);
+            call.set(name, Value::Handle(memory.pointer()));
+            call.inputs.push(memory);
+        };
+        table.row(make, &format!("{name} off by 4"), odd, refused(name));
+    }
+}
+
+const ARRAYS: [(&str, usize); 5] =
+    [("positions", 3), ("scales", 3), ("rotations", 4), ("opacities", 1), ("sh", 3)];
+
+#[test]
+fn arrays_of_gaussians_are_checked_to_the_last_number() {
+    let mut table = Table::new();
+    let make = calls::gaussians_from_arrays;
+    let empty = |call: &mut Call| {
+        ARRAYS.iter().for_each(|(name, _)| call.lent("arrays").put(name, 0, 0));
+        call.lent("arrays").put("count", 0, 0);
+    };
+    table.row(make, "none, all NULL", empty, Fine);
+    table.row(make, "none", |call| call.lent("arrays").put("count", 0, 0), Fine);
+    for (which, (name, each)) in ARRAYS.into_iter().enumerate() {
+        let words = format!("arrays.{name}");
+        table.row(make, &format!("{name} NULL"), |call| call.lent("arrays").put(name, 0, 0), refused(&words));
+        for shift in [1, 2, 3] {
+            let odd = |call: &mut Call| {
+                let mut memory = Memory::of(FEW[which], shift);
+                call.lent("arrays").put(name, 0, memory.pointer() as u64);
+                call.inputs.push(memory);
+            };
+            table.row(make, &format!("{name} off by {shift}"), odd, refused(&words));
+        }
+        let only_aligned_to_floats = |call: &mut Call| {
+            let mut memory = Memory::of(FEW[which], 4);
+            call.lent("arrays").put(name, 0, memory.pointer() as u64);
+            call.inputs.push(memory);
+        };
+        table.row(make, &format!("{name} off by 4"), only_aligned_to_floats, Fine);
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            for i in 0..3 {
+                let spoilt = |call: &mut Call| {
+                    let mut values = FEW[which].to_vec();
+                    values[i * each + each - 1] = bad;
+                    let mut memory = Memory::of(&values, 0);
+                    call.lent("arrays").put(name, 0, memory.pointer() as u64);
+                    call.inputs.push(memory);
+                };
+                table.row(make, &format!("{name}[{i}] {bad}"), spoilt, refused(&format!("{words}[{i}]")));
+            }
+        }
+    }
+    let with = |which: usize, k: usize, value: f32| {
+        move |call: &mut Call| {
+            let mut values = FEW[which].to_vec();
+            values[k] = value;
+            let mut memory = Memory::of(&values, 0);
+            call.lent("arrays").put(ARRAYS[which].0, 0, memory.pointer() as u64);
+            call.inputs.push(memory);
+        }
+    };
+    table.row(make, "a flat Gaussian", with(1, 4, 0.0), refused("arrays.scales[1]"));
+    table.row(make, "a negative scale", with(1, 8, -0.1), refused("arrays.scales[2]"));
+    table.row(make, "too opaque", with(3, 2, 1.0f32.next_up()), refused("arrays.opacities[2]"));
+    table.row(make, "a negative opacity", with(3, 0, -1e-9), refused("arrays.opacities[0]"));
+    table.row(make, "no rotation", with(2, 0, 0.0), refused("arrays.rotations[0]"));
+    table.row(make, "far away", with(0, 0, 3e38), Fine);
+    for degree in 0..4usize {
+        let more = |call: &mut Call| {
+            let mut memory = Memory::of(&vec![0.25f32; 3 * 3 * (degree + 1) * (degree + 1)], 0);
+            call.lent("arrays").put("sh", 0, memory.pointer() as u64);
+            call.lent("arrays").put("sh_degree", 0, degree as u64);
+            call.inputs.push(memory);
+        };
+        table.row(make, &format!("degree {degree}"), more, Fine);
+    }
+    table.row(
+        make,
+        "degree 4",
+        |call| call.lent("arrays").put("sh_degree", 0, 4),
+        refused("arrays.sh_degree"),
+    );
+    table.row(
+        calls::gaussians_merge,
+        "one with itself",
+        |call| call.arguments[1].value = Value::Handle(handle(call)),
+        Fine,
+    );
+}
+
+fn handle(call: &Call) -> usize {
+    let Value::Handle(handle) = call.arguments[0].value else { panic!("a handle") };
+    handle
+}
+
+#[test]
+fn files_that_are_not_there_or_not_what_they_should_be_are_told_by_path() {
+    let mut table = Table::new();
+    let folder = table.world.scratch.clone();
+    let junk = folder.join("junk.ply");
+    let half = b"ply\nformat binary_little_endian 1.0\nelement vertex 3\n";
+    std::fs::write(&junk, half).unwrap();
+    let empty = folder.join("empty");
+    std::fs::write(&empty, b"").unwrap();
+    let path = |path: CString| move |call: &mut Call| call.set("path", Value::Text(path.clone()));
+    let missing = CString::new(b"/nowhere/\xff\xfe/at all\nat all".to_vec()).unwrap();
+
+    let load = calls::gaussians_load_ply;
+    let (io, format) =
+        (|words: &str| Fails(vg_status::Io, words.into()), |w: &str| Fails(vg_status::Format, w.into()));
+    table.row(load, "a path that is not UTF-8", path(missing.clone()), io("/nowhere/"));
+    table.row(load, "a folder", path(text(&folder)), io(folder.to_str().unwrap()));
+    table.row(load, "half a header", path(text(&junk)), format("junk.ply"));
+    table.row(load, "an empty file", path(text(&empty)), format("empty"));
+
+    let save = calls::gaussians_save_ply;
+    table.row(save, "no such folder", path(missing.clone()), io("/nowhere/"));
+    table.row(save, "a folder", path(text(&folder)), format("is a folder"));
+    table.row(save, "over an old file", path(text(&empty)), Fine);
+    table.row(save, "no Gaussians", |call| call.arguments[0].value = Value::Handle(nothing()), Fine);
+    assert_eq!(std::fs::read(&junk).unwrap(), half, "other files are as they were");
+
+    for make in [calls::colmap_open as fn(&World) -> Call, calls::transforms_open] {
+        table.row(make, "a path that is not UTF-8", path(missing.clone()), io("/nowhere/"));
+        table.row(make, "junk", path(text(&junk)), Fails(vg_status::Format, "junk.ply".into()));
+        table.row(
+            make,
+            "a folder without scenes",
+            path(text(&folder)),
+            Fails(vg_status::Format, String::new()),
+        );
+    }
+    for make in [load as fn(&World) -> Call, save, calls::colmap_open, calls::transforms_open] {
+        table.row(make, "no path", path(CString::default()), refused("path"));
+        let long = CString::new(vec![b'x'; 100_000]).unwrap();
+        table.row(make, "a long path", path(long), Fails(vg_status::Io, "xxx".into()));
+    }
+    let file = folder.join("few.ply").join("deeper.ply");
+    table.row(save, "a file for a folder", path(text(&file)), io("deeper.ply"));
+}
+
+/// A handle of no Gaussians.
+fn nothing() -> usize {
+    use std::sync::OnceLock;
+    static NOTHING: OnceLock<usize> = OnceLock::new();
+    *NOTHING.get_or_init(|| unsafe {
+        let mut arrays = std::mem::MaybeUninit::<vg_gaussian_arrays>::uninit();
+        vg_gaussian_arrays_init(arrays.as_mut_ptr(), size_of::<vg_gaussian_arrays>());
+        let mut out = null_mut();
+        assert_eq!(vg_gaussians_from_arrays(arrays.as_ptr(), &raw mut out, null_mut()), vg_status::Ok);
+        out.expose_provenance()
+    })
+}
+
+#[test]
+fn scenes_are_opened_by_names_that_are_there() {
+    let mut table = Table::new();
+    for make in [calls::colmap_open as fn(&World) -> Call, calls::transforms_open] {
+        let names = |names: &'static [Option<&'static [u8]>], count: usize| {
+            move |call: &mut Call| {
+                let mut pointers = Vec::new();
+                for name in names {
+                    let Some(name) = name else {
+                        pointers.push(0);
+                        continue;
+                    };
+                    let mut memory = Memory::new(name, 0);
+                    pointers.push(memory.pointer());
+                    call.inputs.push(memory);
+                }
+                let mut list = Memory::of(&pointers, 0);
+                let pointer = if names.is_empty() { 0 } else { list.pointer() };
+                call.lent("options").put("names", 0, pointer as u64);
+                call.lent("options").put("name_count", 0, count as u64);
+                call.inputs.push(list);
+            }
+        };
+        let two: &[Option<&[u8]>] = &[Some(b"000\0"), None];
+        table.row(make, "a NULL name", names(two, 2), refused("options.names[1]"));
+        table.row(make, "the first name only", names(two, 1), Fine);
+        table.row(make, "no UTF-8", names(&[Some(b"\xff\xfe\0")], 1), refused("options.names[0]"));
+        table.row(make, "no names, two of them", names(&[], 2), refused("options.names"));
+        table.row(
+            make,
+            "an unknown name",
+            names(&[Some(b"9\n9\0")], 1),
+            Fails(vg_status::Argument, String::new()),
+        );
+        table.row(make, "an empty name", names(&[Some(b"\0")], 1), Fails(vg_status::Argument, String::new()));
+        let odd = |call: &mut Call| {
+            let mut list = Memory::of(&[0usize], 4);
+            call.lent("options").put("names", 0, list.pointer() as u64);
+            call.inputs.push(list);
+        };
+        table.row(make, "names off by 4", odd, refused("options.names"));
+        table.row(make, "no context", |call| call.lent("options").put("context", 0, 0), Fine);
+        let without_depth = |call: &mut Call| call.lent("options").put("load_depth", 0, 0);
+        table.row(make, "without depth", without_depth, Fine);
+    }
+    let unplaced = |call: &mut Call| call.lent("options").put("vehicle_from_world", 0, 0);
+    table.row(calls::transforms_open, "the world is the vehicle's frame", unplaced, Fine);
+    // The model is what is not complete.
+    let incomplete = Fails(vg_status::Format, "vehicle_from_world".into());
+    table.row(calls::colmap_open, "a world that lies anywhere", unplaced, incomplete);
+    let sample = text(&table.world.sample);
+    table.row(
+        calls::transforms_open,
+        "the folder",
+        |call| call.set("path", Value::Text(sample.clone())),
+        Fine,
+    );
+
+    // What a scene lends can be lent again.
+    let done = table.row(calls::scene_get_view, "index 1", |_| {}, Fine);
+    let memory = done.memory[2].as_ref().unwrap();
+    let view = unsafe { memory.content().as_ptr().cast::<vg_view>().read_unaligned() };
+    assert!(!view.image.data.is_null() && !view.mask.data.is_null() && !view.depth.data.is_null());
+    assert_eq!(unsafe { CStr::from_ptr(view.name) }.to_str().unwrap(), "000.png");
+    let mut gaussians = null_mut();
+    let status =
+        unsafe { vg_reconstruct(&raw const view, 1, null(), &raw mut gaussians, null_mut(), null_mut()) };
+    assert_eq!(status, vg_status::Ok);
+    unsafe { vg_gaussians_free(gaussians) };
+}
+
+/// Bytes of all arrays.
+fn bytes(gaussians: usize) -> Vec<u8> {
+    let gaussians = gaussians as *const vg_gaussians;
+    unsafe {
+        let (n, degree) = (vg_gaussians_count(gaussians), vg_gaussians_sh_degree(gaussians) as usize);
+        let floats =
+            |pointer: *const f32, each: usize| bytes_of(std::slice::from_raw_parts(pointer, n * each));
+        [
+            floats(vg_gaussians_positions(gaussians), 3),
+            floats(vg_gaussians_scales(gaussians), 3),
+            floats(vg_gaussians_rotations(gaussians), 4),
+            floats(vg_gaussians_opacities(gaussians), 1),
+            floats(vg_gaussians_sh(gaussians), (degree + 1).pow(2) * 3),
+        ]
+        .concat()
+    }
+}
+
+#[test]
+fn views_of_a_newer_program_give_the_same_bytes() {
+    let mut table = Table::new();
+    let make = calls::reconstruct;
+    let expected = bytes(table.row(make, "as it is", |_| {}, Fine).handle("out_gaussians"));
+    for size in [400, 456, 4096] {
+        let done = table.row(
+            make,
+            &format!("views of {size} bytes"),
+            |call| call.lent("views").resize(size, 0),
+            Fine,
+        );
+        assert_eq!(bytes(done.handle("out_gaussians")), expected);
+    }
+    let odd = |call: &mut Call| call.lent("views").shift = 1;
+    assert_eq!(bytes(table.row(make, "views off by 1", odd, Fine).handle("out_gaussians")), expected);
+
+    for (element, size) in [(1, 400), (3, 0), (3, usize::MAX)] {
+        let words = refused(&format!("views[{element}].struct_size"));
+        table.row(make, "views of two sizes", |call| call.lent("views").claim(element, size), words);
+    }
+    for size in [393, 396, 399] {
+        let words = refused("views[0].struct_size");
+        table.row(make, &format!("views of {size} bytes"), |call| call.lent("views").resize(size, 0), words);
+    }
+    let last = |call: &mut Call| {
+        call.lent("views").resize(400, 0);
+        let at = call.lent("views").bytes.len() - 1;
+        call.lent("views").bytes[at] = 1;
+    };
+    table.row(make, "a number that nobody knows", last, refused("views[3]"));
+}
+
+#[test]
+fn views_that_make_no_vehicle_are_told_by_index() {
+    let mut table = Table::new();
+    let make = calls::reconstruct;
+    let null = |field: &'static str| move |call: &mut Call| call.lent("views").put_in(1, field, 0, 0);
+    table.row(make, "no picture", null("image.data"), refused("views[1].image.data"));
+    table.row(make, "no mask", null("mask.data"), Fine);
+    table.row(make, "no depth", null("depth.data"), Fine);
+    for (part, width) in [("image", 47), ("image", 24), ("mask", 47), ("depth", 24)] {
+        let other = |call: &mut Call| call.lent("views").put_in(1, &format!("{part}.width"), 0, width);
+        table.row(make, &format!("{part} {width} wide"), other, refused(&format!("views[1].{part}")));
+    }
+    let tight = |call: &mut Call| {
+        for part in ["image", "mask", "depth"] {
+            call.lent("views").put(&format!("{part}.row_stride"), 0, 0);
+        }
+    };
+    // Other pixels than those meant, but there they are.
+    table.row(make, "no strides", tight, Fine);
+
+    let name = |name: &'static [u8]| {
+        move |call: &mut Call| {
+            let mut memory = Memory::new(name, 0);
+            call.lent("views").put_in(1, "name", 0, memory.pointer() as u64);
+            call.inputs.push(memory);
+        }
+    };
+    table.row(make, "an empty name", name(b"\0"), Fine);
+    table.row(make, "a name of two lines", name(b"a\nb\x07\0"), Fine);
+    table.row(make, "no UTF-8", name(b"caf\xe9\0"), refused("views[1].name"));
+    let named_and_wrong = |call: &mut Call| {
+        name(b"two\nlines\0")(call);
+        call.lent("views").put_in(1, "image.width", 0, 24);
+    };
+    table.row(make, "a name of two lines in a message", named_and_wrong, refused("lines"));
+
+    for count in 1..4u64 {
+        table.row(make, &format!("{count} views"), |call| call.set("view_count", Value::Number(count)), Fine);
+    }
+    let hull_of_one = |call: &mut Call| {
+        call.set("view_count", Value::Number(1));
+        call.lent("options").put("prior", 0, 2);
+    };
+    table.row(make, "a hull of one view", hull_of_one, Fine);
+    let given = |call: &mut Call| {
+        call.lent("options").put("prior", 0, 1);
+        call.lent("views").put_in(2, "depth.data", 0, 0);
+    };
+    table.row(make, "depth that was not given", given, refused("views[2]"));
+
+    // Depth that is none: every pixel NaN, infinite or negative.
+    for bad in [f32::NAN, f32::INFINITY, -1.0, 0.0, f32::MAX, f32::from_bits(1)] {
+        let spoilt = |call: &mut Call| {
+            for i in 0..4 {
+                let mut memory = Memory::of(&[bad; 48 * 36], 0);
+                call.lent("views").put_in(i, "depth.data", 0, memory.pointer() as u64);
+                call.lent("views").put_in(i, "depth.row_stride", 0, 0);
+                call.inputs.push(memory);
+            }
+        };
+        let mut call = make(&table.world);
+        spoilt(&mut call);
+        let done = call.run(true);
+        assert!([vg_status::Ok, vg_status::Reconstruction].contains(&done.status), "{bad}: {}", done.message);
+    }
+    let blind = |call: &mut Call| {
+        for i in 0..4 {
+            let mut memory = Memory::new(&[127; 48 * 36], 0);
+            for (field, value) in [
+                ("mask.data", memory.pointer() as u64),
+                ("mask.row_stride", 0),
+                ("mask.width", 48),
+                ("mask.height", 36),
+                ("mask.format", vg_format::Gray8 as u64),
+            ] {
+                call.lent("views").put_in(i, field, 0, value);
+            }
+            call.inputs.push(memory);
+        }
+    };
+    table.row(make, "masks without vehicle", blind, refused("views"));
+    let unknown_size = |call: &mut Call| (0..3).for_each(|k| call.lent("options").put("vehicle_size", k, 0));
+    table.row(make, "a vehicle of unknown size", unknown_size, Fine);
+    table.row(make, "no context", |call| call.lent("options").put("context", 0, 0), Fine);
+}
+
+#[test]
+fn cameras_that_stand_anywhere_make_finite_numbers_or_none() {
+    let table = Table::new();
+    for far in [1e4, 1e6, 1e10, 1e19, 1e30, 1e39, 1e150, 1e300, 1.7e308] {
+        for (prior, views) in [(1, 0..1), (1, 0..4), (2, 0..1), (2, 0..4)] {
+            let mut call = calls::reconstruct(&table.world);
+            call.lent("options").put("prior", 0, prior);
+            for i in views {
+                call.lent("views").put_in(i, "camera.vehicle_from_camera", 3, f64::to_bits(far));
+            }
+            call.run(true);
+        }
+        for make in [calls::render as fn(&World) -> Call, calls::render_through_a_lens] {
+            let mut call = make(&table.world);
+            call.lent("camera").put("vehicle_from_camera", 3, f64::to_bits(far));
+            call.run(true);
+            let mut call = make(&table.world);
+            call.lent("camera").put("params", 2, f64::to_bits(far.min(1e9)));
+            call.run(true);
+            let mut call = make(&table.world);
+            call.lent("camera").put("params", 0, f64::to_bits(far.min(1e9)));
+            call.run(true);
+        }
+        for k in 4..8 {
+            for sign in [1.0, -1.0] {
+                let mut call = calls::render_through_a_lens(&table.world);
+                call.lent("camera").put("params", k, f64::to_bits(far * sign));
+                call.run(true);
+                let mut call = calls::reconstruct(&table.world);
+                call.lent("views").put("camera.model", 0, vg_camera_model::Opencv as u64);
+                call.lent("views").put("camera.params", k, f64::to_bits(far * sign));
+                call.run(true);
+            }
+        }
+    }
+}
+
+#[test]
+fn pictures_are_written_in_every_format_at_any_address_and_only_there() {
+    let mut table = Table::new();
+    let make = calls::render;
+    for transparent in [0, 1] {
+        for (format, pixel) in [(1, 3), (2, 3), (3, 4), (4, 4), (5, 1), (6, 16), (7, 4)] {
+            for (stride, shift) in [(0, 0), (48 * pixel + 1, 1), (48 * pixel, 3)] {
+                let set = |call: &mut Call| {
+                    let mut color = blank(36, 48 * pixel, stride.max(48 * pixel), shift, format == 6);
+                    call.lent("options").put("background", 0, transparent);
+                    call.lent("target").put("color", 0, color.memory.pointer() as u64);
+                    call.lent("target").put("color_row_stride", 0, stride as u64);
+                    call.lent("target").put("color_format", 0, format);
+                    call.targets[0] = color;
+                };
+                let fits = [3, 4, 6].contains(&format) || (transparent == 0 && format < 3);
+                let expect = if fits { Fine } else { refused("target.color_format") };
+                table.row(make, &format!("format {format}, stride {stride}, off by {shift}"), set, expect);
+            }
+        }
+    }
+    for number in [-1, 0, 8, 77, i32::MIN, i32::MAX] {
+        let set = |call: &mut Call| call.lent("target").put("color_format", 0, bits32(number));
+        table.row(make, &format!("format {number}"), set, refused("target.color_format"));
+        let unused = |call: &mut Call| {
+            set(call);
+            call.lent("target").put("color", 0, 0);
+        };
+        table.row(make, &format!("format {number} without colour"), unused, Fine);
+    }
+    let without = |names: &'static [&'static str]| {
+        move |call: &mut Call| names.iter().for_each(|name| call.lent("target").put(name, 0, 0))
+    };
+    table.row(make, "only depth", without(&["color"]), Fine);
+    table.row(make, "only colour", without(&["depth"]), Fine);
+    table.row(make, "neither", without(&["color", "depth"]), refused("target"));
+    table.row(make, "no context", |call| call.lent("options").put("context", 0, 0), Fine);
+    table.row(make, "nothing to draw", |call| call.arguments[0].value = Value::Handle(nothing()), Fine);
+    let close = |call: &mut Call| {
+        call.lent("options").put("near_plane", 0, u64::from(2.0f32.to_bits()));
+        call.lent("options").put("far_plane", 0, u64::from(1.0f32.to_bits()));
+    };
+    table.row(make, "far before near", close, refused("options.far_plane"));
+}
+
+thread_local! {
+    static CALLS_LEFT: Cell<usize> = const { Cell::new(0) };
+    static LINES: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
+}
+
+unsafe extern "C" fn stop(_: *const c_char, fraction: f64, _: *mut c_void) -> i32 {
+    assert!((0.0..=1.0).contains(&fraction));
+    CALLS_LEFT.set(CALLS_LEFT.get().wrapping_sub(1));
+    if CALLS_LEFT.get() == 0 { [1, -1, 2, i32::MIN][LINES.with_borrow(Vec::len) % 4] } else { 0 }
+}
+
+unsafe extern "C" fn log(level: i32, message: *const c_char, _: *mut c_void) {
+    let message = unsafe { CStr::from_ptr(message) }.to_str().unwrap();
+    assert!((1..=3).contains(&level) && !message.is_empty() && !message.contains('\n'));
+    LINES.with_borrow_mut(|lines| lines.push(message.to_owned()));
+}
+
+#[test]
+fn a_callback_may_stop_at_any_of_its_calls() {
+    let mut table = Table::new();
+    let callbacks = |call: &mut Call| {
+        call.lent("options").put("progress", 0, stop as *const () as u64);
+        call.lent("options").put("log", 0, log as *const () as u64);
+    };
+    for prior in [1, 2] {
+        let with = |call: &mut Call| {
+            callbacks(call);
+            call.lent("options").put("prior", 0, prior);
+        };
+        let mut call = calls::reconstruct(&table.world);
+        with(&mut call);
+        CALLS_LEFT.set(usize::MAX);
+        let expected = bytes(call.run(true).handle("out_gaussians"));
+        let times = usize::MAX - CALLS_LEFT.get();
+        assert!(times > 6, "{times} calls");
+        for n in 1..=times {
+            let arm = |call: &mut Call| {
+                with(call);
+                CALLS_LEFT.set(n);
+            };
+            table.row(
+                calls::reconstruct,
+                &format!("stopped at {n}"),
+                arm,
+                Fails(vg_status::Cancelled, "cancelled".into()),
+            );
+        }
+        // The context is as good as it was.
+        CALLS_LEFT.set(usize::MAX);
+        let mut call = calls::reconstruct(&table.world);
+        with(&mut call);
+        assert_eq!(bytes(call.run(true).handle("out_gaussians")), expected);
+    }
+    assert!(LINES.with_borrow(Vec::len) > 10);
+}
+
+/// What a callback that calls the library is told.
+struct Inner {
+    world: *const World,
+    depth: Cell<u32>,
+    calls: Cell<u32>,
+}
+
+unsafe fn call_again(user: *mut c_void) {
+    let inner = unsafe { &*user.cast::<Inner>() };
+    let world = unsafe { &*inner.world };
+    inner.calls.set(inner.calls.get() + 1);
+    if inner.depth.get() > 0 {
+        return;
+    }
+    inner.depth.set(1);
+    for make in [calls::render as fn(&World) -> Call, calls::render_through_a_lens, calls::gaussians_mirror] {
+        assert!(make(world).run(true).is_ok());
+    }
+    // An error of the inner call is its own.
+    assert_eq!(unsafe { vg_gaussians_mirror(null(), null_mut(), null_mut()) }, vg_status::Argument);
+    let mut call = calls::reconstruct(world);
+    call.lent("options").put("progress", 0, again as *const () as u64);
+    call.lent("options").put("progress_user", 0, user.expose_provenance() as u64);
+    assert!(call.run(true).is_ok());
+    inner.depth.set(0);
+}
+
+unsafe extern "C" fn again(_: *const c_char, _: f64, user: *mut c_void) -> i32 {
+    unsafe { call_again(user) };
+    0
+}
+
+unsafe extern "C" fn log_again(_: i32, _: *const c_char, user: *mut c_void) {
+    unsafe { call_again(user) };
+}
+
+#[test]
+fn a_callback_may_call_the_library_with_the_same_context() {
+    let mut table = Table::new();
+    let expected = bytes(table.row(calls::reconstruct, "as it is", |_| {}, Fine).handle("out_gaussians"));
+    let inner = Inner { world: &raw const table.world, depth: Cell::new(0), calls: Cell::new(0) };
+    let mut call = calls::reconstruct(&table.world);
+    let user = (&raw const inner).expose_provenance() as u64;
+    for (name, value) in [
+        ("progress", again as *const () as u64),
+        ("progress_user", user),
+        ("log", log_again as *const () as u64),
+        ("log_user", user),
+    ] {
+        call.lent("options").put(name, 0, value);
+    }
+    assert_eq!(bytes(call.run(true).handle("out_gaussians")), expected);
+    assert!(inner.calls.get() > 20, "{} calls", inner.calls.get());
+}
+
+#[test]
+fn many_threads_in_one_context_get_the_same_bytes() {
+    let table = Table::new();
+    let world = &table.world;
+    let expected = bytes(calls::reconstruct(world).run(true).handle("out_gaussians"));
+    let picture = |make: fn(&World) -> Call| {
+        let mut call = make(world);
+        assert!(call.run(true).is_ok());
+        call.targets[0].memory.content().to_vec()
+    };
+    let (straight, bent) = (picture(calls::render), picture(calls::render_through_a_lens));
+    // The world is handles, which any number of threads may use.
+    struct Shared<'a>(&'a World);
+    unsafe impl Sync for Shared<'_> {}
+    impl Shared<'_> {
+        fn world(&self) -> &World {
+            self.0
+        }
+    }
+    let shared = Shared(world);
+    std::thread::scope(|scope| {
+        for _ in 0..8 {
+            scope.spawn(|| {
+                let world = shared.world();
+                for _ in 0..3 {
+                    let done = calls::reconstruct(world).run(true);
+                    assert_eq!(bytes(done.handle("out_gaussians")), expected);
+                    for (make, expected) in [
+                        (calls::render as fn(&World) -> Call, &straight),
+                        (calls::render_through_a_lens, &bent),
+                    ] {
+                        let mut call = make(world);
+                        assert!(call.run(true).is_ok());
+                        assert_eq!(call.targets[0].memory.content(), &expected[..]);
+                    }
+                    let mut call = calls::reconstruct(world);
+                    call.lent("views").put_in(3, "camera.flags", 0, 1);
+                    assert!(call.run(true).message.starts_with("views[3].camera.flags: "));
+                }
+            });
+        }
+    });
+    // Another context, and none, give the same.
+    for threads in [1, 3, 16] {
+        let mut call = calls::context_new(world);
+        call.lent("options").put("threads", 0, threads);
+        let context = call.run(true);
+        assert_eq!(u64::from(unsafe { vg_context_threads(context.handle("out") as _) }), threads);
+        let mut call = calls::reconstruct(world);
+        call.lent("options").put("context", 0, context.handle("out") as u64);
+        assert_eq!(bytes(call.run(true).handle("out_gaussians")), expected);
+    }
+    let mut call = calls::reconstruct(world);
+    call.lent("options").put("context", 0, 0);
+    assert_eq!(bytes(call.run(true).handle("out_gaussians")), expected);
+}
+
+/// Threads of this process.
+#[cfg(target_os = "linux")]
+fn threads() -> usize {
+    std::fs::read_dir("/proc/self/task").unwrap().count()
+}
+
+/// Run alone, in a process of its own, by the test below.
+#[cfg(target_os = "linux")]
+#[test]
+#[ignore = "counts the threads of its process"]
+fn alone_threads_end_with_their_context() {
+    let before = threads();
+    let table = Table::new();
+    let here = threads();
+    assert_eq!(here, before + 2, "the world's context");
+    for _ in 0..3 {
+        let mut call = calls::context_new(&table.world);
+        call.lent("options").put("threads", 0, 7);
+        let context = call.run(true);
+        assert_eq!(threads(), here + 7);
+        drop(context);
+        assert_eq!(threads(), here, "vg_context_free ends its threads");
+        for make in [calls::reconstruct as fn(&World) -> Call, calls::render, calls::transforms_open] {
+            let mut call = make(&table.world);
+            call.lent("options").put("context", 0, 0);
+            assert!(call.run(true).is_ok());
+            assert_eq!(threads(), here, "{} without context ends its threads", call.function);
+        }
+        assert!(calls::gaussians_transform(&table.world).run(true).is_ok());
+        assert_eq!(threads(), here);
+    }
+    drop(table);
+    assert_eq!(threads(), before);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn threads_end_with_their_context_or_call() {
+    let mut command = std::process::Command::new(std::env::current_exe().unwrap());
+    let name = "arguments::alone_threads_end_with_their_context";
+    let said = crate::tools::run(command.args(["--exact", name, "--ignored", "--test-threads=1"]));
+    assert!(said.contains("1 passed"), "{said}");
+}
+
+/// What an uninitialised variable may hold.
+fn garbage<T>() -> *mut T {
+    std::ptr::without_provenance_mut(0xDEAD_BEE0)
+}
+
+#[test]
+fn handles_of_failed_calls_are_null_and_made_ones_are_freed() {
+    // `Call::run` hands in a pointer to nowhere; here, what a caller has in its variable.
+    let (mut gaussians, mut report, mut error) =
+        (garbage::<vg_gaussians>(), garbage::<vg_report>(), garbage::<vg_error>());
+    unsafe {
+        let status = vg_reconstruct(null(), 1, null(), &raw mut gaussians, &raw mut report, &raw mut error);
+        assert_eq!(status, vg_status::Argument);
+        assert!(gaussians.is_null() && report.is_null() && !error.is_null());
+        vg_error_free(error);
+        let status = vg_reconstruct(null(), 1, null(), null_mut(), &raw mut report, null_mut());
+        assert_eq!(status, vg_status::Argument);
+    }
+    assert_eq!(
+        [Made::Context, Made::Gaussians, Made::Report, Made::Scene].map(|m| unsafe { m.free(0) }).len(),
+        4
+    );
+}

@@ -1,0 +1,1271 @@
+//! The functions of the header as data: for each that can fail, its arguments by name, a value for each that works,
+//! and values that do not. Whoever runs such a call checks what holds for every call, whatever was handed in.
+//!
+//! The table test and the fuzz target share this file; `super` gives `GUARD` and `vehicle`.
+#![allow(unsafe_code, dead_code)] // each uses a part
+
+use super::{GUARD, vehicle};
+use std::ffi::{CStr, CString, c_void};
+use std::mem::offset_of;
+use std::path::{Path, PathBuf};
+use std::ptr::{null, null_mut};
+use vg::capi::*;
+
+/// What guards and gaps are filled with.
+pub const CANARY: u8 = 0xA5;
+
+/// Where an out parameter points before the call: nowhere.
+const NOWHERE: usize = 0xDEAD_BEE0;
+
+/// Memory lent to the library: exactly the bytes it was promised, at any address, between guards.
+pub struct Memory {
+    allocation: Vec<u8>,
+    start: usize,
+    before: Vec<u8>,
+}
+
+impl Memory {
+    /// `shift` bytes from where anything may lie.
+    pub fn new(content: &[u8], shift: usize) -> Self {
+        let start = GUARD + shift;
+        let mut allocation = Vec::with_capacity(start + content.len() + GUARD);
+        allocation.resize(start, CANARY);
+        allocation.extend_from_slice(content);
+        allocation.resize(start + content.len() + GUARD, CANARY);
+        Self { before: allocation.clone(), start, allocation }
+    }
+
+    pub fn of<T: Copy>(values: &[T], shift: usize) -> Self {
+        Self::new(bytes_of(values), shift)
+    }
+
+    pub fn pointer(&mut self) -> usize {
+        unsafe { self.allocation.as_mut_ptr().add(self.start) }.expose_provenance()
+    }
+
+    pub fn content(&self) -> &[u8] {
+        &self.allocation[self.start..self.allocation.len() - GUARD]
+    }
+
+    /// Changes the content before it is lent.
+    pub fn poke(&mut self, at: usize, bytes: &[u8]) {
+        let at = self.start + at;
+        self.allocation[at..at + bytes.len()].copy_from_slice(bytes);
+        self.before = self.allocation.clone();
+    }
+
+    pub fn is_unchanged(&self) -> bool {
+        self.allocation == self.before
+    }
+
+    pub fn guards_are_unchanged(&self) -> bool {
+        let end = self.allocation.len() - GUARD;
+        let guards = |bytes: &[u8]| bytes[..self.start].iter().chain(&bytes[end..]).all(|&b| b == CANARY);
+        guards(&self.allocation)
+    }
+
+    pub fn doubles(&self) -> Vec<f64> {
+        self.content().chunks_exact(8).map(|b| f64::from_ne_bytes(b.try_into().unwrap())).collect()
+    }
+}
+
+/// The bytes of numbers.
+pub fn bytes_of<T: Copy>(values: &[T]) -> &[u8] {
+    unsafe { std::slice::from_raw_parts(values.as_ptr().cast(), size_of_val(values)) }
+}
+
+/// What should come of a value.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Outcome {
+    Fine,
+    Refused,
+    NotBuilt,
+}
+use Outcome::{Fine, NotBuilt, Refused};
+
+/// Values of a number with what should come of them; the lowest bytes count.
+pub type Tries = Vec<(u64, Outcome)>;
+
+/// Numbers that no enumeration has.
+const NO_CHOICE: [i32; 4] = [-1, 77, i32::MIN, i32::MAX];
+
+pub fn bits32(value: i32) -> u64 {
+    u64::from(value.cast_unsigned())
+}
+
+/// A number of an enumeration.
+pub fn choice(good: &[i32]) -> Tries {
+    let good = good.iter().map(|&n| (bits32(n), Fine));
+    good.chain(NO_CHOICE.map(|n| (bits32(n), Refused))).collect()
+}
+
+/// The same with one that this build does not have.
+fn choice_without(good: &[i32], missing: i32) -> Tries {
+    let mut tries = choice(good);
+    tries.push((bits32(missing), NotBuilt));
+    tries
+}
+
+/// A field kept for later.
+fn reserved() -> Tries {
+    vec![(0, Fine), (1, Refused), (1 << 31, Refused), (u64::MAX, Refused)]
+}
+
+fn within32(low: f32, high: f32) -> Tries {
+    let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, low.next_down(), high.next_up(), -1e30, 1e30];
+    let good = [low, high].map(|v| (u64::from(v.to_bits()), Fine));
+    good.into_iter().chain(bad.map(|v| (u64::from(v.to_bits()), Refused))).collect()
+}
+
+fn within64(low: f64, high: f64) -> Tries {
+    let bad = [low.next_down(), high.next_up(), -1e300, 1e300].map(|v| (v.to_bits(), Refused));
+    [(low.to_bits(), Fine), (high.to_bits(), Fine)].into_iter().chain(bad).chain(finite()).collect()
+}
+
+/// A number that must be one.
+fn finite() -> Tries {
+    [f64::NAN, f64::INFINITY, f64::NEG_INFINITY].map(|v| (v.to_bits(), Refused)).to_vec()
+}
+
+fn sizes() -> Tries {
+    [0, 8193, 1 << 31, u32::MAX].map(|v| (u64::from(v), Refused)).to_vec()
+}
+
+fn counts(bad: &[u64]) -> Tries {
+    bad.iter().map(|&n| (n, Refused)).collect()
+}
+
+/// Pointers and what goes with them: rows of their own.
+fn elsewhere() -> Tries {
+    Vec::new()
+}
+
+/// A field of a struct.
+#[derive(Clone)]
+pub struct Field {
+    pub name: String,
+    /// What an error calls it.
+    pub word: String,
+    pub offset: usize,
+    /// Of one element.
+    pub size: usize,
+    pub count: usize,
+    /// Of every element.
+    pub tries: Tries,
+}
+
+fn member_size<T, F>(_: fn(&T) -> &F) -> usize {
+    size_of::<F>()
+}
+
+macro_rules! fields {
+    ($type:ty { $($name:ident $([$count:literal])? $(as $word:literal)? : $tries:expr),* $(,)? }) => {
+        vec![$({
+            let count = [$($count,)? 1usize][0];
+            let word: &str = [$($word,)? stringify!($name)][0];
+            Field {
+                name: stringify!($name).into(),
+                word: word.into(),
+                offset: offset_of!($type, $name),
+                size: member_size(|s: &$type| &s.$name) / count,
+                count,
+                tries: $tries,
+            }
+        }),*]
+    };
+}
+
+/// Fields of a struct inside a struct.
+fn inside(name: &str, offset: usize, fields: Vec<Field>) -> Vec<Field> {
+    let inner = |f: Field| Field {
+        name: format!("{name}.{}", f.name),
+        word: if f.word.is_empty() { name.into() } else { format!("{name}.{}", f.word) },
+        offset: offset + f.offset,
+        ..f
+    };
+    fields.into_iter().map(inner).collect()
+}
+
+fn camera_fields() -> Vec<Field> {
+    fields!(vg_camera {
+        struct_size: elsewhere(),
+        width as "": sizes(),
+        height as "": sizes(),
+        model: choice(&[1]),
+        flags: reserved(),
+        params[16] as "": finite(),
+        vehicle_from_camera[12]: finite(),
+        reserved[4]: reserved(),
+    })
+}
+
+fn image_fields(formats: &[i32]) -> Vec<Field> {
+    fields!(vg_image {
+        data: elsewhere(),
+        row_stride: counts(&[1, 35, usize::MAX as u64, usize::MAX as u64 / 2, (isize::MAX / 35) as u64]),
+        width as "": sizes(),
+        height as "": sizes(),
+        format: choice(formats),
+        flags: reserved(),
+    })
+}
+
+fn view_fields() -> Vec<Field> {
+    let mut all = fields!(vg_view { struct_size: elsewhere(), name: elsewhere() });
+    all.extend(inside("camera", offset_of!(vg_view, camera), camera_fields()));
+    all.extend(inside("image", offset_of!(vg_view, image), image_fields(&[1, 2, 3, 4, 5])));
+    all.extend(inside("mask", offset_of!(vg_view, mask), image_fields(&[5])));
+    all.extend(inside("depth", offset_of!(vg_view, depth), image_fields(&[7])));
+    all
+}
+
+/// A struct argument, or an array of structs.
+#[derive(Clone)]
+pub struct Lent {
+    pub of: &'static str,
+    pub bytes: Vec<u8>,
+    /// From one element to the next; the `struct_size` it claims unless a row says otherwise.
+    pub stride: usize,
+    pub count: usize,
+    pub shift: usize,
+    pub fields: Vec<Field>,
+    /// Names of elements in errors, `views[0]`.
+    pub is_array: bool,
+}
+
+impl Lent {
+    fn new<T: Copy>(of: &'static str, values: &[T], fields: Vec<Field>) -> Self {
+        Self::of_bytes::<T>(of, bytes_of(values).to_vec(), fields)
+    }
+
+    /// Zeros but for the size.
+    fn zeroed<T: Copy>(of: &'static str, fields: Vec<Field>) -> Self {
+        let mut lent = Self::of_bytes::<T>(of, vec![0; size_of::<T>()], fields);
+        lent.claim(0, size_of::<T>());
+        lent
+    }
+
+    fn of_bytes<T>(of: &'static str, bytes: Vec<u8>, fields: Vec<Field>) -> Self {
+        let covered: usize = fields.iter().map(|f| f.size * f.count).sum();
+        assert_eq!(covered, size_of::<T>(), "the table has every field of {of}");
+        let count = bytes.len() / covered;
+        Self { of, bytes, stride: covered, count, shift: 0, fields, is_array: count > 1 }
+    }
+
+    pub fn field(&self, name: &str) -> &Field {
+        self.fields.iter().find(|f| f.name == name).unwrap_or_else(|| panic!("{} has no {name}", self.of))
+    }
+
+    /// Sets element `index` of a field of the first struct; the lowest bytes of `value`.
+    pub fn put(&mut self, name: &str, index: usize, value: u64) {
+        self.put_in(0, name, index, value);
+    }
+
+    pub fn put_in(&mut self, element: usize, name: &str, index: usize, value: u64) {
+        let field = self.field(name);
+        let (at, size) = (element * self.stride + field.offset + index * field.size, field.size);
+        self.bytes[at..at + size].copy_from_slice(&value.to_le_bytes()[..size]);
+    }
+
+    pub fn get(&self, element: usize, name: &str, index: usize) -> u64 {
+        let field = self.field(name);
+        let at = element * self.stride + field.offset + index * field.size;
+        let mut bytes = [0; 8];
+        bytes[..field.size].copy_from_slice(&self.bytes[at..at + field.size]);
+        u64::from_le_bytes(bytes)
+    }
+
+    /// Makes every element `size` bytes long and say so; what is new holds `fill`. There are always the 8 bytes that
+    /// say the size.
+    pub fn resize(&mut self, size: usize, fill: u8) {
+        let (old, new) = (self.stride, size.max(8));
+        let mut bytes = Vec::with_capacity(new * self.count);
+        for element in self.bytes.chunks_exact(old) {
+            let start = bytes.len();
+            bytes.extend_from_slice(&element[..old.min(new)]);
+            bytes.resize(start + new, fill);
+            bytes[start..start + 8].copy_from_slice(&(size as u64).to_le_bytes());
+        }
+        (self.bytes, self.stride) = (bytes, new);
+    }
+
+    pub fn claim(&mut self, element: usize, size: usize) {
+        self.put_in(element, "struct_size", 0, size as u64);
+    }
+}
+
+/// Which handle comes out.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Made {
+    Context,
+    Gaussians,
+    Report,
+    Scene,
+}
+
+impl Made {
+    pub unsafe fn free(self, handle: usize) {
+        unsafe {
+            match self {
+                Self::Context => vg_context_free(handle as _),
+                Self::Gaussians => vg_gaussians_free(handle as _),
+                Self::Report => vg_report_free(handle as _),
+                Self::Scene => vg_scene_free(handle as _),
+            }
+        }
+    }
+}
+
+/// What an argument is.
+#[derive(Clone)]
+pub enum Value {
+    Null,
+    /// By value.
+    Number(u64),
+    /// Read only.
+    Doubles(Vec<f64>),
+    Text(CString),
+    /// A handle of the world's.
+    Handle(usize),
+    Struct(Lent),
+    OutHandle(Made),
+    OutDoubles(usize),
+    OutStruct(Lent),
+}
+
+pub struct Argument {
+    pub name: &'static str,
+    /// What an error calls it.
+    pub word: &'static str,
+    pub value: Value,
+    pub nullable: bool,
+    /// Of a number, or of each of the doubles.
+    pub tries: Tries,
+}
+
+/// A picture that the library writes: rows of `row` bytes, `stride` apart.
+pub struct Target {
+    pub memory: Memory,
+    pub row: usize,
+    pub stride: usize,
+    pub is_float: bool,
+}
+
+type Invoke = unsafe fn(&[usize], *mut *mut vg_error) -> vg_status;
+
+/// A call that is about to be made.
+pub struct Call {
+    pub function: &'static str,
+    pub arguments: Vec<Argument>,
+    /// Memory that structs point to, read only.
+    pub inputs: Vec<Memory>,
+    pub targets: Vec<Target>,
+    invoke: Invoke,
+    /// Whether there is an `out_error`.
+    has_error: bool,
+}
+
+/// What came of a call.
+pub struct Done {
+    pub status: vg_status,
+    /// Empty where there was no `out_error`.
+    pub message: String,
+    /// What the arguments pointed to, by argument; handles of a call that succeeded.
+    pub memory: Vec<Option<Memory>>,
+    pub handles: Vec<(&'static str, Made, usize)>,
+}
+
+impl Done {
+    pub fn is_ok(&self) -> bool {
+        self.status == vg_status::Ok
+    }
+
+    pub fn handle(&self, name: &str) -> usize {
+        self.handles.iter().find(|(n, ..)| *n == name).map_or(0, |h| h.2)
+    }
+}
+
+impl Drop for Done {
+    fn drop(&mut self) {
+        for &(_, made, handle) in &self.handles {
+            unsafe { made.free(handle) };
+        }
+    }
+}
+
+/// A call of a function of the header with all its arguments as words.
+macro_rules! invoke {
+    ($function:ident $($index:literal)*) => {
+        |a, error| unsafe { $function($(a[$index] as _,)* error) }
+    };
+}
+
+/// An `_init` function, which reports no error.
+macro_rules! invoke_init {
+    ($function:ident) => {
+        |a, _| unsafe { $function(a[0] as _, a[1]) }
+    };
+}
+
+impl Call {
+    fn new(function: &'static str, invoke: Invoke) -> Self {
+        Self { function, arguments: vec![], inputs: vec![], targets: vec![], invoke, has_error: true }
+    }
+
+    fn argument(mut self, name: &'static str, value: Value) -> Self {
+        self.arguments.push(Argument { name, word: name, value, nullable: false, tries: vec![] });
+        self
+    }
+
+    fn last(&mut self) -> &mut Argument {
+        self.arguments.last_mut().expect("an argument")
+    }
+
+    fn nullable(mut self) -> Self {
+        self.last().nullable = true;
+        self
+    }
+
+    fn tries(mut self, tries: Tries) -> Self {
+        self.last().tries = tries;
+        self
+    }
+
+    /// What errors call it where that is not its name.
+    fn word(mut self, word: &'static str) -> Self {
+        self.last().word = word;
+        self
+    }
+
+    fn memory(mut self, memory: Vec<Memory>) -> Self {
+        self.inputs.extend(memory);
+        self
+    }
+
+    pub fn position(&self, name: &str) -> usize {
+        let found = self.arguments.iter().position(|a| a.name == name);
+        found.unwrap_or_else(|| panic!("{} has no {name}", self.function))
+    }
+
+    pub fn set(&mut self, name: &str, value: Value) {
+        let at = self.position(name);
+        self.arguments[at].value = value;
+    }
+
+    pub fn lent(&mut self, name: &str) -> &mut Lent {
+        let at = self.position(name);
+        match &mut self.arguments[at].value {
+            Value::Struct(lent) | Value::OutStruct(lent) => lent,
+            _ => panic!("{} {name} is no struct", self.function),
+        }
+    }
+
+    pub fn doubles(&mut self, name: &str) -> &mut Vec<f64> {
+        let at = self.position(name);
+        match &mut self.arguments[at].value {
+            Value::Doubles(values) => values,
+            _ => panic!("{} {name} is no array of double", self.function),
+        }
+    }
+
+    /// Makes the call and checks what holds for all of them.
+    ///
+    /// # Panics
+    /// Where one of the promises of the header is broken.
+    pub fn run(&mut self, with_error: bool) -> Done {
+        let mut memory: Vec<Option<Memory>> = self.arguments.iter().map(|a| lend(&a.value)).collect();
+        let mut slots = vec![NOWHERE; self.arguments.len()];
+        let mut words = Vec::with_capacity(self.arguments.len());
+        for ((argument, memory), slot) in self.arguments.iter().zip(&mut memory).zip(&mut slots) {
+            words.push(match (&argument.value, memory) {
+                (_, Some(memory)) => memory.pointer(),
+                (Value::Number(value), _) => *value as usize,
+                (Value::Handle(handle), _) => *handle,
+                (Value::OutHandle(_), _) => (&raw mut *slot).expose_provenance(),
+                _ => 0,
+            });
+        }
+        let mut error: *mut vg_error = std::ptr::with_exposed_provenance_mut(NOWHERE);
+        let out_error = if with_error { &raw mut error } else { null_mut() };
+        let status = unsafe { (self.invoke)(&words, out_error) };
+
+        let has_error = with_error && self.has_error;
+        let message = if has_error { unsafe { taken(error, status) } } else { String::new() };
+        let mut done = Done { status, message, memory, handles: vec![] };
+        for (argument, &slot) in self.arguments.iter().zip(&slots) {
+            if let Value::OutHandle(made) = argument.value {
+                match status {
+                    vg_status::Ok => {
+                        assert!(
+                            slot != 0 && slot != NOWHERE,
+                            "{}: {} was not set",
+                            self.function,
+                            argument.name
+                        );
+                        done.handles.push((argument.name, made, slot));
+                    }
+                    _ => assert_eq!(
+                        slot, 0,
+                        "{}: {} is not NULL after a failure",
+                        self.function, argument.name
+                    ),
+                }
+            }
+        }
+        self.check(&done);
+        done
+    }
+
+    fn check(&self, done: &Done) {
+        let call = || format!("{}: {:?} {}", self.function, done.status, done.message);
+        assert_ne!(done.status, vg_status::Internal, "{}", call());
+        for (argument, memory) in self.arguments.iter().zip(&done.memory) {
+            let Some(memory) = memory else { continue };
+            let may_change =
+                done.is_ok() && matches!(argument.value, Value::OutDoubles(_) | Value::OutStruct(_));
+            assert!(may_change || memory.is_unchanged(), "{}: {} was changed", call(), argument.name);
+            assert!(memory.guards_are_unchanged(), "{}: written beside {}", call(), argument.name);
+            if may_change && matches!(argument.value, Value::OutDoubles(_)) {
+                assert!(memory.doubles().iter().all(|v| v.is_finite()), "{}: not finite", call());
+            }
+        }
+        assert!(self.inputs.iter().all(Memory::is_unchanged), "{}: input was changed", call());
+        for target in &self.targets {
+            assert!(done.is_ok() || target.memory.is_unchanged(), "{}: the target was changed", call());
+            assert!(target.memory.guards_are_unchanged(), "{}: written beside the target", call());
+            let rows = target.memory.content().chunks(target.stride.max(1));
+            for row in rows {
+                assert!(row[target.row.min(row.len())..].iter().all(|&b| b == CANARY), "{}: a gap", call());
+                if done.is_ok() && target.is_float {
+                    let mut floats = row[..target.row].chunks_exact(4);
+                    let finite = floats.all(|b| f32::from_ne_bytes(b.try_into().unwrap()).is_finite());
+                    assert!(finite, "{}: not finite", call());
+                }
+            }
+        }
+        for &(_, made, handle) in &done.handles {
+            if made == Made::Gaussians {
+                unsafe { check_gaussians(handle as _) }
+            }
+        }
+    }
+}
+
+/// The invariants of Gaussians.
+unsafe fn check_gaussians(gaussians: *const vg_gaussians) {
+    unsafe {
+        let n = vg_gaussians_count(gaussians);
+        let degree = vg_gaussians_sh_degree(gaussians) as usize;
+        let floats = |pointer: *const f32, each: usize| match n {
+            0 => {
+                assert!(pointer.is_null(), "no Gaussians, no array");
+                &[]
+            }
+            _ => std::slice::from_raw_parts(pointer, n * each),
+        };
+        let finite = |values: &[f32]| values.iter().all(|v| v.is_finite());
+        assert!(finite(floats(vg_gaussians_positions(gaussians), 3)), "positions are finite");
+        assert!(finite(floats(vg_gaussians_sh(gaussians), (degree + 1).pow(2) * 3)), "colours are finite");
+        let scales = floats(vg_gaussians_scales(gaussians), 3);
+        assert!(finite(scales) && scales.iter().all(|&s| s > 0.0), "scales are positive");
+        assert!(floats(vg_gaussians_opacities(gaussians), 1).iter().all(|o| (0.0..=1.0).contains(o)));
+        for q in floats(vg_gaussians_rotations(gaussians), 4).chunks_exact(4) {
+            let norm: f32 = q.iter().map(|v| v * v).sum();
+            // Four squares of rounded numbers.
+            assert!((norm - 1.0).abs() < 1e-5, "rotations are unit quaternions: {q:?}");
+        }
+    }
+}
+
+fn lend(value: &Value) -> Option<Memory> {
+    match value {
+        Value::Doubles(values) => Some(Memory::of(values, 0)),
+        Value::Text(text) => Some(Memory::new(text.as_bytes_with_nul(), 0)),
+        Value::Struct(lent) | Value::OutStruct(lent) => Some(Memory::new(&lent.bytes, lent.shift)),
+        Value::OutDoubles(count) => Some(Memory::new(&vec![CANARY; count * 8], 0)),
+        Value::Null | Value::Number(_) | Value::Handle(_) | Value::OutHandle(_) => None,
+    }
+}
+
+/// Takes the error's message and frees it.
+unsafe fn taken(error: *mut vg_error, status: vg_status) -> String {
+    assert_ne!(error.addr(), NOWHERE, "out_error was not set");
+    unsafe {
+        assert_eq!(vg_error_code(error), status);
+        let message = CStr::from_ptr(vg_error_message(error)).to_str().expect("UTF-8").to_owned();
+        assert_eq!(error.is_null(), status == vg_status::Ok, "{message}");
+        assert_eq!(message.is_empty(), status == vg_status::Ok, "{status:?} without a message");
+        assert!(!message.contains(['\n', '\r']), "one line: {message:?}");
+        if status == vg_status::Argument {
+            assert!(message.contains(": ") && message.contains("; allowed: "), "found, allowed: {message}");
+        }
+        vg_error_free(error);
+        message
+    }
+}
+
+/// What a photograph is made of, as C has it.
+pub struct Photograph {
+    pub camera: vg_camera,
+    pub rgb: Vec<u8>,
+    pub mask: Vec<u8>,
+    pub depth: Vec<f32>,
+}
+
+/// Handles and pictures that calls are made with.
+pub struct World {
+    pub context: usize,
+    pub gaussians: usize,
+    /// Three of them, of degree 0.
+    pub few: usize,
+    pub report: usize,
+    pub scene: usize,
+    pub photographs: Vec<Photograph>,
+    /// A folder with a `transforms.json`, a COLMAP model, pictures and depth.
+    pub sample: PathBuf,
+    pub scratch: PathBuf,
+}
+
+pub const WIDTH: u32 = 48;
+pub const HEIGHT: u32 = 36;
+
+impl World {
+    pub fn new(sample: &Path, scratch: &Path) -> Self {
+        let mut world = Self {
+            context: 0,
+            gaussians: 0,
+            few: 0,
+            report: 0,
+            scene: 0,
+            photographs: vehicle::right_side(WIDTH, HEIGHT).views.iter().map(photograph).collect(),
+            sample: sample.to_owned(),
+            scratch: scratch.to_owned(),
+        };
+        let keep = |mut done: Done, name: &str| {
+            assert!(done.is_ok(), "{}", done.message);
+            let at = done.handles.iter().position(|h| h.0 == name).expect("the handle");
+            done.handles.swap_remove(at).2
+        };
+        world.context = keep(context_new(&world).run(true), "out");
+        world.few = keep(gaussians_from_arrays(&world).run(true), "out");
+        let mut call = reconstruct(&world);
+        call.lent("options").put("points", 0, 1);
+        let mut done = call.run(true);
+        assert!(done.is_ok(), "{}", done.message);
+        (world.gaussians, world.report) = (done.handle("out_gaussians"), done.handle("out_report"));
+        done.handles.clear();
+        world.gaussians_saved();
+        world.scene = keep(transforms_open(&world).run(true), "out");
+        world
+    }
+
+    /// The file that `vg_gaussians_load_ply` reads.
+    fn gaussians_saved(&self) {
+        let path = text(self.scratch.join("few.ply"));
+        let status = unsafe { vg_gaussians_save_ply(self.few as _, path.as_ptr(), null_mut()) };
+        assert_eq!(status, vg_status::Ok);
+    }
+
+    fn camera(&self) -> Lent {
+        Lent::new("vg_camera", &[self.photographs[0].camera], camera_fields())
+    }
+
+    /// The views in as many formats, some with gaps between rows, some at odd addresses.
+    pub fn views(&self) -> (Lent, Vec<Memory>) {
+        let mut memory = Vec::new();
+        let views: Vec<vg_view> =
+            self.photographs.iter().enumerate().map(|(i, p)| p.view(i, &mut memory)).collect();
+        (Lent::new("vg_view", &views, view_fields()), memory)
+    }
+}
+
+impl Drop for World {
+    fn drop(&mut self) {
+        unsafe {
+            vg_scene_free(self.scene as _);
+            vg_report_free(self.report as _);
+            vg_gaussians_free(self.few as _);
+            vg_gaussians_free(self.gaussians as _);
+            vg_context_free(self.context as _);
+        }
+    }
+}
+
+pub fn text(path: impl AsRef<Path>) -> CString {
+    CString::new(path.as_ref().to_str().expect("UTF-8")).expect("no NUL")
+}
+
+fn photograph(view: &vg::View) -> Photograph {
+    let (i, mut params) = (view.camera.intrinsics, [0.0; 16]);
+    params[..4].copy_from_slice(&[i.fx, i.fy, i.cx, i.cy]);
+    let camera = vg_camera {
+        struct_size: size_of::<vg_camera>(),
+        width: view.camera.width,
+        height: view.camera.height,
+        model: vg_camera_model::Pinhole as i32,
+        flags: 0,
+        params,
+        vehicle_from_camera: view.camera.vehicle_from_camera.to_row_major(),
+        reserved: [0; 4],
+    };
+    Photograph {
+        camera,
+        rgb: view.image.pixels().as_flattened().to_vec(),
+        mask: view.mask.as_ref().unwrap().labels().iter().map(|&l| l as u8).collect(),
+        depth: view.depth.as_ref().unwrap().depth().to_vec(),
+    }
+}
+
+/// Rows of `row` bytes, `stride` apart, the gaps and what follows holding noise.
+fn spread(content: &[u8], row: usize, stride: usize, extra: usize) -> Vec<u8> {
+    let mut out: Vec<u8> = Vec::new();
+    for bytes in content.chunks_exact(row) {
+        out.extend_from_slice(bytes);
+        out.resize(out.len() + stride - row, 0x5A);
+    }
+    out.resize(out.len() + extra, 0x5A);
+    out
+}
+
+impl Photograph {
+    fn view(&self, i: usize, memory: &mut Vec<Memory>) -> vg_view {
+        let width = WIDTH as usize;
+        let mut image = |bytes: Vec<u8>, shift: usize, stride: usize, format: vg_format| {
+            let mut lent = Memory::new(&bytes, shift);
+            let data = lent.pointer() as *const c_void;
+            memory.push(lent);
+            let (width, height) = (self.camera.width, self.camera.height);
+            vg_image { data, row_stride: stride, width, height, format: format as i32, flags: 0 }
+        };
+        let masked = |order: [usize; 4]| -> Vec<u8> {
+            let pixels = self.rgb.chunks_exact(3).zip(&self.mask);
+            pixels.flat_map(|(p, &m)| order.map(|k| [p[0], p[1], p[2], m][k])).collect()
+        };
+        let photograph = match i {
+            // Large enough to be taken for four bytes a pixel.
+            0 => image(spread(&self.rgb, width * 3, width * 4 + 5, 0), 1, width * 4 + 5, vg_format::Rgb8),
+            1 => image(self.rgb.clone(), 0, 0, vg_format::Rgb8),
+            2 => image(masked([2, 1, 0, 3]), 3, 0, vg_format::Bgra8),
+            _ => image(masked([0, 1, 2, 3]), 0, 0, vg_format::Rgba8),
+        };
+        // Of an odd view, the mask is the photograph's alpha.
+        let mask = match i {
+            0 => image(spread(&self.mask, width, width + 3, 0), 1, width + 3, vg_format::Gray8),
+            1 => image(self.mask.clone(), 0, 0, vg_format::Gray8),
+            _ => vg_image { data: null(), row_stride: 0, width: 0, height: 0, format: 0, flags: 0 },
+        };
+        let depth = bytes_of(&self.depth);
+        let depth = match i {
+            // Rows that are not aligned to floats.
+            0 => image(spread(depth, width * 4, width * 4 + 3, 0), 1, width * 4 + 3, vg_format::Depth32f),
+            _ => image(depth.to_vec(), 0, 0, vg_format::Depth32f),
+        };
+        vg_view {
+            struct_size: size_of::<vg_view>(),
+            name: null(),
+            camera: self.camera,
+            image: photograph,
+            mask,
+            depth,
+        }
+    }
+}
+
+const IDENTITY: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+
+/// Twice the size, turned by 90 degrees about z, moved.
+const SIMILARITY: [f64; 16] =
+    [0.0, -2.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.5, 0.0, 0.0, 0.0, 1.0];
+
+/// A pose that is far from where the camera is but may be anywhere.
+const POSE: [f64; 12] = [0.0, -1.0, 0.0, 4e5, 1.0, 0.0, 0.0, 5e6, 0.0, 0.0, 1.0, 100.0];
+
+/// A call that works, for each function that can fail.
+pub const CALLS: [fn(&World) -> Call; 31] = [
+    context_options_init,
+    context_new,
+    camera_init,
+    camera_from_colmap_model,
+    camera_from_opencv,
+    camera_scale,
+    camera_crop,
+    pose_from_colmap,
+    pose_from_opengl,
+    pose_from_box,
+    camera_project,
+    view_init,
+    options_init,
+    report_figures_init,
+    report_get_figures,
+    gaussian_arrays_init,
+    gaussians_load_ply,
+    gaussians_save_ply,
+    gaussians_from_arrays,
+    gaussians_transform,
+    gaussians_mirror,
+    gaussians_merge,
+    reconstruct,
+    render_options_init,
+    image_target_init,
+    render,
+    render_through_a_lens,
+    scene_options_init,
+    colmap_open,
+    transforms_open,
+    scene_get_view,
+];
+
+fn init(function: &'static str, invoke: Invoke, name: &'static str, target: Lent) -> Call {
+    let size = target.stride as u64;
+    let mut call = Call::new(function, invoke)
+        .argument(name, Value::OutStruct(Lent { bytes: vec![CANARY; target.stride], ..target }))
+        .argument("size", Value::Number(size))
+        .tries(counts(&[0, 1, size - 1, 4097, usize::MAX as u64]));
+    call.has_error = false;
+    call
+}
+
+macro_rules! init_of {
+    ($rust:ident, $function:ident, $name:literal, $lent:expr) => {
+        pub fn $rust(_: &World) -> Call {
+            init(stringify!($function), invoke_init!($function), $name, $lent)
+        }
+    };
+}
+
+init_of!(context_options_init, vg_context_options_init, "options", context_options());
+init_of!(camera_init, vg_camera_init, "camera", Lent::zeroed::<vg_camera>("vg_camera", camera_fields()));
+init_of!(view_init, vg_view_init, "view", Lent::zeroed::<vg_view>("vg_view", view_fields()));
+init_of!(options_init, vg_options_init, "options", options(0));
+init_of!(report_figures_init, vg_report_figures_init, "figures", figures());
+init_of!(gaussian_arrays_init, vg_gaussian_arrays_init, "arrays", arrays(0, [0; 5], 0));
+init_of!(render_options_init, vg_render_options_init, "options", render_options(0));
+init_of!(image_target_init, vg_image_target_init, "target", target(0, 0, 0, 0));
+init_of!(scene_options_init, vg_scene_options_init, "options", scene_options(0));
+
+fn context_options() -> Lent {
+    let fields = fields!(vg_context_options {
+        struct_size: elsewhere(),
+        threads: counts(&[1025, 1 << 31, u64::from(u32::MAX)]),
+        flags: reserved(),
+    });
+    let mut lent = Lent::zeroed::<vg_context_options>("vg_context_options", fields);
+    lent.put("threads", 0, 2);
+    lent
+}
+
+pub fn context_new(_: &World) -> Call {
+    Call::new("vg_context_new", invoke!(vg_context_new 0 1))
+        .argument("options", Value::Struct(context_options()))
+        .nullable()
+        .argument("out", Value::OutHandle(Made::Context))
+}
+
+pub fn camera_from_colmap_model(w: &World) -> Call {
+    Call::new("vg_camera_from_colmap_model", invoke!(vg_camera_from_colmap_model 0 1 2 3 4 5 6))
+        .argument("model", Value::Number(1))
+        .tries(choice(&[1]))
+        .argument("params", Value::Doubles(vec![100.0, 110.0, 31.5, 24.0]))
+        .word("camera")
+        .tries(finite())
+        .argument("param_count", Value::Number(4))
+        .tries(counts(&[0, 3, 5, 16, 1 << 40, usize::MAX as u64]))
+        .argument("width", Value::Number(63))
+        .word("size")
+        .tries(sizes())
+        .argument("height", Value::Number(48))
+        .word("size")
+        .tries(sizes())
+        .argument("vehicle_from_camera", Value::Doubles(IDENTITY.to_vec()))
+        .nullable()
+        .tries(finite())
+        .argument("out", Value::OutStruct(w.camera()))
+}
+
+pub fn camera_from_opencv(w: &World) -> Call {
+    Call::new("vg_camera_from_opencv", invoke!(vg_camera_from_opencv 0 1 2 3 4 5 6 7))
+        .argument("k", Value::Doubles(vec![100.0, 0.0, 31.0, 0.0, 110.0, 23.5, 0.0, 0.0, 1.0]))
+        .word("camera")
+        .tries(finite())
+        .argument("distortion", Value::Doubles(vec![0.1, 0.01, 0.001, 0.002]))
+        .tries(finite())
+        .argument("distortion_count", Value::Number(4))
+        .word("distortion")
+        .tries(counts(&[1, 2, 3]))
+        .argument("fisheye", Value::Number(0))
+        .tries(choice(&[0, 1]))
+        .argument("width", Value::Number(63))
+        .word("size")
+        .tries(sizes())
+        .argument("height", Value::Number(48))
+        .word("size")
+        .tries(sizes())
+        .argument("vehicle_from_camera", Value::Doubles(IDENTITY.to_vec()))
+        .nullable()
+        .tries(finite())
+        .argument("out", Value::OutStruct(w.camera()))
+}
+
+pub fn camera_scale(w: &World) -> Call {
+    Call::new("vg_camera_scale", invoke!(vg_camera_scale 0 1 2 3))
+        .argument("camera", Value::Struct(w.camera()))
+        .argument("width", Value::Number(24))
+        .word("size")
+        .tries(sizes())
+        .argument("height", Value::Number(18))
+        .word("size")
+        .tries(sizes())
+        .argument("out", Value::OutStruct(w.camera()))
+}
+
+pub fn camera_crop(w: &World) -> Call {
+    Call::new("vg_camera_crop", invoke!(vg_camera_crop 0 1 2 3 4 5))
+        .argument("camera", Value::Struct(w.camera()))
+        .argument("x", Value::Number(10))
+        .word("crop")
+        .tries(counts(&[29, 48, u64::from(u32::MAX)]))
+        .argument("y", Value::Number(8))
+        .word("crop")
+        .tries(counts(&[21, 36, u64::from(u32::MAX)]))
+        .argument("width", Value::Number(20))
+        .word("crop")
+        .tries(counts(&[0, 39, u64::from(u32::MAX)]))
+        .argument("height", Value::Number(16))
+        .word("crop")
+        .tries(counts(&[0, 29, u64::from(u32::MAX)]))
+        .argument("out", Value::OutStruct(w.camera()))
+}
+
+pub fn pose_from_colmap(_: &World) -> Call {
+    Call::new("vg_pose_from_colmap", invoke!(vg_pose_from_colmap 0 1 2 3))
+        .argument("qvec", Value::Doubles(vec![2.0, 0.0, -1.0, 0.5]))
+        .tries(finite())
+        .argument("tvec", Value::Doubles(vec![1.0, 2.0, 3.0]))
+        .tries(finite())
+        .argument("vehicle_from_world", Value::Doubles(SIMILARITY.to_vec()))
+        .nullable()
+        .tries(finite())
+        .argument("out", Value::OutDoubles(12))
+}
+
+pub fn pose_from_opengl(_: &World) -> Call {
+    Call::new("vg_pose_from_opengl", invoke!(vg_pose_from_opengl 0 1 2))
+        .argument("camera_to_world", Value::Doubles(POSE.to_vec()))
+        .tries(finite())
+        .argument("vehicle_from_world", Value::Doubles(SIMILARITY.to_vec()))
+        .nullable()
+        .tries(finite())
+        .argument("out", Value::OutDoubles(12))
+}
+
+pub fn pose_from_box(_: &World) -> Call {
+    Call::new("vg_pose_from_box", invoke!(vg_pose_from_box 0 1 2))
+        .argument("vehicle_in_ego", Value::Doubles(POSE.to_vec()))
+        .tries(finite())
+        .argument("camera_in_ego", Value::Doubles(IDENTITY.to_vec()))
+        .tries(finite())
+        .argument("out", Value::OutDoubles(12))
+}
+
+pub fn camera_project(w: &World) -> Call {
+    Call::new("vg_camera_project", invoke!(vg_camera_project 0 1 2))
+        .argument("camera", Value::Struct(w.camera()))
+        .argument("point_vehicle", Value::Doubles(vec![0.5, -0.25, 0.5]))
+        .tries(finite())
+        .argument("out_pixel", Value::OutDoubles(2))
+}
+
+fn figures() -> Lent {
+    let fields = fields!(vg_report_figures {
+        struct_size: elsewhere(),
+        gaussian_count: elsewhere(),
+        mirrored_count: elsewhere(),
+        views_used: elsewhere(),
+        threads: elsewhere(),
+        prior: elsewhere(),
+        sh_degree: elsewhere(),
+        total_ms: elsewhere(),
+        peak_rss_bytes: elsewhere(),
+        has_input_error: elsewhere(),
+        has_box: elsewhere(),
+        input_psnr_db: elsewhere(),
+        input_silhouette_iou: elsewhere(),
+        box_size[3]: elsewhere(),
+        extent_low[3]: elsewhere(),
+        extent_high[3]: elsewhere(),
+    });
+    Lent::zeroed::<vg_report_figures>("vg_report_figures", fields)
+}
+
+pub fn report_get_figures(w: &World) -> Call {
+    Call::new("vg_report_get_figures", invoke!(vg_report_get_figures 0 1))
+        .argument("report", Value::Handle(w.report))
+        .argument("out", Value::OutStruct(figures()))
+}
+
+pub fn gaussians_load_ply(w: &World) -> Call {
+    Call::new("vg_gaussians_load_ply", invoke!(vg_gaussians_load_ply 0 1))
+        .argument("path", Value::Text(text(w.scratch.join("few.ply"))))
+        .argument("out", Value::OutHandle(Made::Gaussians))
+}
+
+pub fn gaussians_save_ply(w: &World) -> Call {
+    Call::new("vg_gaussians_save_ply", invoke!(vg_gaussians_save_ply 0 1))
+        .argument("gaussians", Value::Handle(w.few))
+        .argument("path", Value::Text(text(w.scratch.join("saved.ply"))))
+}
+
+fn arrays(count: usize, pointers: [usize; 5], degree: i32) -> Lent {
+    let fields = fields!(vg_gaussian_arrays {
+        struct_size: elsewhere(),
+        count: counts(&[1 << 31, 1 << 60, u64::MAX]),
+        positions: elsewhere(),
+        scales: elsewhere(),
+        rotations: elsewhere(),
+        opacities: elsewhere(),
+        sh: elsewhere(),
+        sh_degree: choice(&[0]),
+        flags: reserved(),
+    });
+    let [positions, scales, rotations, opacities, sh] = pointers.map(|p| p as *const f32);
+    let value = vg_gaussian_arrays {
+        struct_size: size_of::<vg_gaussian_arrays>(),
+        count,
+        positions,
+        scales,
+        rotations,
+        opacities,
+        sh,
+        sh_degree: degree,
+        flags: 0,
+    };
+    Lent::new("vg_gaussian_arrays", &[value], fields)
+}
+
+/// Three Gaussians: centres, scales, rotations, opacities, colours.
+pub const FEW: [&[f32]; 5] = [
+    &[0.0, 0.5, 0.25, 1.0, -0.5, 0.5, -1.0, 0.0, 0.75],
+    &[0.1, 0.2, 0.05, 0.3, 0.3, 0.01, 0.02, 0.5, 0.1],
+    &[1.0, 0.0, 0.0, 0.0, 0.5, -0.5, 0.5, 0.5, 0.0, 0.0, -3.0, 4.0],
+    &[1.0, 0.5, 0.0],
+    &[0.2, -0.1, 0.6, 1.0, 0.0, -1.0, 0.3, 0.3, 0.3],
+];
+
+pub fn gaussians_from_arrays(_: &World) -> Call {
+    let mut memory: Vec<Memory> = FEW.iter().map(|values| Memory::of(values, 0)).collect();
+    let pointers: Vec<usize> = memory.iter_mut().map(Memory::pointer).collect();
+    Call::new("vg_gaussians_from_arrays", invoke!(vg_gaussians_from_arrays 0 1))
+        .argument("arrays", Value::Struct(arrays(3, pointers.try_into().unwrap(), 0)))
+        .argument("out", Value::OutHandle(Made::Gaussians))
+        .memory(memory)
+}
+
+pub fn gaussians_transform(w: &World) -> Call {
+    Call::new("vg_gaussians_transform", invoke!(vg_gaussians_transform 0 1 2))
+        .argument("gaussians", Value::Handle(w.gaussians))
+        .argument("to_from_vehicle", Value::Doubles(SIMILARITY.to_vec()))
+        .tries(finite())
+        .argument("out", Value::OutHandle(Made::Gaussians))
+}
+
+pub fn gaussians_mirror(w: &World) -> Call {
+    Call::new("vg_gaussians_mirror", invoke!(vg_gaussians_mirror 0 1))
+        .argument("gaussians", Value::Handle(w.gaussians))
+        .argument("out", Value::OutHandle(Made::Gaussians))
+}
+
+pub fn gaussians_merge(w: &World) -> Call {
+    Call::new("vg_gaussians_merge", invoke!(vg_gaussians_merge 0 1 2))
+        .argument("first", Value::Handle(w.gaussians))
+        .argument("second", Value::Handle(w.few))
+        .argument("out", Value::OutHandle(Made::Gaussians))
+}
+
+fn options(context: usize) -> Lent {
+    let fields = fields!(vg_options {
+        struct_size: elsewhere(),
+        context: elsewhere(),
+        prior: choice_without(&[0, 1, 2], 3),
+        symmetry: choice(&[0, 1, 2]),
+        sh_degree: choice(&[0, 1, 2, 3]),
+        keep: vec![(31, Fine), (32, Refused), (u64::from(u32::MAX), Refused)],
+        check: choice(&[0, 1]),
+        points: choice(&[0, 1]),
+        vehicle_size[3]: within64(0.1, 30.0),
+        progress: elsewhere(),
+        progress_user: elsewhere(),
+        log: elsewhere(),
+        log_user: elsewhere(),
+    });
+    let mut lent = Lent::zeroed::<vg_options>("vg_options", fields);
+    lent.put("context", 0, context as u64);
+    lent.put("sh_degree", 0, 2);
+    lent.put("check", 0, 1);
+    for (i, metres) in [4.4f64, 1.8, 1.4].into_iter().enumerate() {
+        lent.put("vehicle_size", i, metres.to_bits());
+    }
+    lent
+}
+
+pub fn reconstruct(w: &World) -> Call {
+    let (views, memory) = w.views();
+    Call::new("vg_reconstruct", invoke!(vg_reconstruct 0 1 2 3 4))
+        .argument("views", Value::Struct(views))
+        .argument("view_count", Value::Number(4))
+        .tries(counts(&[0, 4097, 1 << 60, usize::MAX as u64]))
+        .argument("options", Value::Struct(options(w.context)))
+        .nullable()
+        .argument("out_gaussians", Value::OutHandle(Made::Gaussians))
+        .argument("out_report", Value::OutHandle(Made::Report))
+        .nullable()
+        .memory(memory)
+}
+
+fn render_options(context: usize) -> Lent {
+    let fields = fields!(vg_render_options {
+        struct_size: elsewhere(),
+        context: elsewhere(),
+        backend: choice_without(&[0, 1], 2),
+        background: choice(&[0, 1]),
+        background_color[3]: within32(0.0, 1.0),
+        alpha: choice(&[0, 1]),
+        depth_mode: choice(&[0, 1]),
+        sh_degree: choice(&[0, 1, 2, 3]),
+        antialiased: choice(&[0, 1]),
+        blur: within32(1e-4, 100.0),
+        near_plane: within32(1e-6, 1e10),
+        far_plane: within32(0.01, 1e10),
+        max_alpha: within32(0.01, 0.9999),
+        flags: reserved(),
+    });
+    let mut lent = Lent::zeroed::<vg_render_options>("vg_render_options", fields);
+    lent.put("context", 0, context as u64);
+    lent.put("sh_degree", 0, 3);
+    for (name, value) in [("blur", 0.3f32), ("near_plane", 0.01), ("far_plane", 1e10), ("max_alpha", 0.99)] {
+        lent.put(name, 0, u64::from(value.to_bits()));
+    }
+    lent
+}
+
+fn target(color: usize, color_stride: usize, depth: usize, depth_stride: usize) -> Lent {
+    let overflowing = [1, 47, usize::MAX as u64, usize::MAX as u64 / 2, (isize::MAX / 35) as u64];
+    let fields = fields!(vg_image_target {
+        struct_size: elsewhere(),
+        width as "target.size": counts(&[0, 47, 49, 8193, u64::from(u32::MAX)]),
+        height as "target.size": counts(&[0, 35, 37, 8193, u64::from(u32::MAX)]),
+        color: elsewhere(),
+        color_row_stride: counts(&overflowing),
+        depth: elsewhere(),
+        depth_row_stride: counts(&overflowing),
+        color_format: choice(&[]),
+        flags: reserved(),
+    });
+    let value = vg_image_target {
+        struct_size: size_of::<vg_image_target>(),
+        width: WIDTH,
+        height: HEIGHT,
+        color: color as _,
+        color_row_stride: color_stride,
+        depth: depth as _,
+        depth_row_stride: depth_stride,
+        color_format: vg_format::Rgba8 as i32,
+        flags: 0,
+    };
+    Lent::new("vg_image_target", &[value], fields)
+}
+
+/// A picture of the world's size without memory from the first to the last byte of its last pixel, gaps in it.
+pub fn blank(height: u32, row: usize, stride: usize, shift: usize, is_float: bool) -> Target {
+    let memory = Memory::new(&vec![CANARY; (height as usize - 1) * stride + row], shift);
+    Target { memory, row, stride, is_float }
+}
+
+pub fn render(w: &World) -> Call {
+    render_as(w, "vg_render", w.camera())
+}
+
+/// The same function with a camera whose straight lines are bent: another way through the renderer.
+pub fn render_through_a_lens(w: &World) -> Call {
+    let mut camera = w.camera();
+    camera.put("model", 0, vg_camera_model::Opencv as u64);
+    for (i, k) in [-0.1f64, 0.01, 1e-3, -1e-3].into_iter().enumerate() {
+        camera.put("params", 4 + i, k.to_bits());
+    }
+    let at = camera.fields.iter().position(|f| f.name == "model").unwrap();
+    camera.fields[at].tries = choice(&[4]);
+    render_as(w, "vg_render", camera)
+}
+
+fn render_as(w: &World, function: &'static str, camera: Lent) -> Call {
+    let width = WIDTH as usize;
+    let mut color = blank(HEIGHT, width * 4, width * 4 + 5, 1, false);
+    let mut depth = blank(HEIGHT, width * 4, width * 4 + 3, 2, true);
+    let lent = target(color.memory.pointer(), color.stride, depth.memory.pointer(), depth.stride);
+    let mut call = Call::new(function, invoke!(vg_render 0 1 2 3))
+        .argument("gaussians", Value::Handle(w.gaussians))
+        .argument("camera", Value::Struct(camera))
+        .argument("options", Value::Struct(render_options(w.context)))
+        .nullable()
+        .argument("target", Value::Struct(lent));
+    call.targets = vec![color, depth];
+    call
+}
+
+fn scene_options(context: usize) -> Lent {
+    let fields = fields!(vg_scene_options {
+        struct_size: elsewhere(),
+        context: elsewhere(),
+        vehicle_from_world: elsewhere(),
+        names: elsewhere(),
+        name_count: counts(&[0, 4097, 1 << 60, u64::MAX]),
+        depth_scale: [finite(), vec![((-1.0f64).to_bits(), Refused), (1e-3f64.to_bits(), Fine)]].concat(),
+        load_depth: choice(&[0, 1]),
+        flags: reserved(),
+        log: elsewhere(),
+        log_user: elsewhere(),
+    });
+    let mut lent = Lent::zeroed::<vg_scene_options>("vg_scene_options", fields);
+    lent.put("context", 0, context as u64);
+    lent.put("load_depth", 0, 1);
+    lent
+}
+
+/// Two views by name, one with its extension, one without.
+fn names() -> Vec<Memory> {
+    let mut names = vec![Memory::new(b"001\0", 0), Memory::new(b"000.png\0", 0)];
+    let pointers: Vec<usize> = names.iter_mut().map(Memory::pointer).collect();
+    names.push(Memory::of(&pointers, 0));
+    names
+}
+
+fn open(w: &World, function: &'static str, invoke: Invoke, path: &Path) -> Call {
+    let (mut memory, mut options) = (names(), scene_options(w.context));
+    options.put("names", 0, memory[2].pointer() as u64);
+    options.put("name_count", 0, 2);
+    memory.push(Memory::of(&SIMILARITY, 4));
+    options.put("vehicle_from_world", 0, memory[3].pointer() as u64);
+    Call::new(function, invoke)
+        .argument("path", Value::Text(text(path)))
+        .argument("options", Value::Struct(options))
+        .argument("out", Value::OutHandle(Made::Scene))
+        .memory(memory)
+}
+
+pub fn colmap_open(w: &World) -> Call {
+    open(w, "vg_colmap_open", invoke!(vg_colmap_open 0 1 2), &w.sample)
+}
+
+pub fn transforms_open(w: &World) -> Call {
+    let mut call =
+        open(w, "vg_transforms_open", invoke!(vg_transforms_open 0 1 2), &w.sample.join("transforms.json"));
+    call.arguments[1].nullable = true;
+    call
+}
+
+pub fn scene_get_view(w: &World) -> Call {
+    Call::new("vg_scene_get_view", invoke!(vg_scene_get_view 0 1 2))
+        .argument("scene", Value::Handle(w.scene))
+        .argument("index", Value::Number(1))
+        .tries(counts(&[2, 3, 1 << 40, usize::MAX as u64]))
+        .argument("out", Value::OutStruct(Lent::zeroed::<vg_view>("vg_view", view_fields())))
+}
