@@ -44,6 +44,12 @@ def test_the_package_holds_the_c_library_types_and_licences() -> None:
         assert any(file.endswith(f"licenses/{licence}") for file in files)
 
 
+def test_a_source_distribution_is_refused_with_the_way_out(tmp_path: Path) -> None:
+    code = f"import build_backend; build_backend.build_sdist({str(tmp_path)!r})"
+    ran = subprocess.run([sys.executable, "-c", code], cwd=BINDINGS, capture_output=True, text=True, check=False)
+    assert ran.returncode == 1 and "`pip wheel ./bindings/python`" in ran.stderr
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="sonames are ELF's")
 def test_only_the_c_library_is_called_libvg() -> None:
     # A program in the same process that needs libvg.so.0 would be given the extension module instead.
