@@ -620,7 +620,7 @@ typedef struct vg_view {
     struct vg_image image;
     /**
      * GRAY8, of the camera's size: 128 and above is vehicle. `data` NULL: the photograph's alpha is the mask; where
-     * it has none, every pixel is vehicle, which the silhouette prior refuses.
+     * it has none, or one that is 255 throughout, every pixel is vehicle, which the silhouette prior refuses.
      */
     struct vg_image mask;
     /**

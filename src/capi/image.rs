@@ -92,7 +92,11 @@ pub(super) unsafe fn photograph(argument: &str, image: &vg_image) -> Result<(Rgb
             let row = |v: usize| &bytes[v * stride..][..width as usize * 4];
             let alpha: Vec<u8> =
                 (0..height as usize).flat_map(|v| row(v).chunks_exact(4).map(|p| p[3])).collect();
-            Some(Mask::from_strided(argument, &alpha, width, height, width as usize)?)
+            // As in picture files: alpha that hides nothing says nothing.
+            match alpha.iter().all(|&a| a == u8::MAX) {
+                true => None,
+                false => Some(Mask::from_strided(argument, &alpha, width, height, width as usize)?),
+            }
         }
         _ => None,
     };

@@ -29,5 +29,6 @@ mod common;
 mod contents;
 mod header;
 mod layout;
+mod pictures;
 mod symbols;
 mod tools;
