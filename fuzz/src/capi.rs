@@ -63,7 +63,8 @@ pub fn execute<S: Source>(world: &World, source: &mut S) -> Vec<(&'static str, v
     let mut log = Vec::new();
     for _ in 0..=source.below(3) {
         // Where there is most to go wrong.
-        let large: [fn(&World) -> Call; 3] = [calls::reconstruct, calls::render, calls::render_through_a_lens];
+        let large: [fn(&World) -> Call; 3] =
+            [calls::reconstruct, calls::render, calls::render_through_a_lens];
         let make = if source.one_in(3) { source.pick(&large) } else { source.pick(&CALLS) };
         let mut call = make(world);
         for _ in 0..source.below(7) {
@@ -259,19 +260,38 @@ fn field<S: Source>(world: &World, call: &mut Call, i: usize, source: &mut S) {
             call.inputs.push(memory);
         }
         // Pictures get their memory once all is decided; arrays and names may go.
-        "image.data" | "mask.data" | "depth.data" | "color" | "depth" | "positions" | "scales" | "rotations"
-        | "opacities" | "sh" | "names" | "vehicle_from_world" => {
+        "image.data" | "mask.data" | "depth.data" | "color" | "depth" | "positions" | "scales"
+        | "rotations" | "opacities" | "sh" | "names" | "vehicle_from_world" => {
             if source.one_in(3) {
                 put(lent, 0);
             }
         }
         "name_count" => put(lent, source.pick(&[0, 1, 2, 4097, u64::MAX])),
-        "count" if lent.of == "vg_gaussian_arrays" => put(lent, source.pick(&[0, 1, 2, 3, 1 << 31, u64::MAX])),
-        "image.row_stride" | "mask.row_stride" | "depth.row_stride" | "color_row_stride" | "depth_row_stride" => {
-            let row = source.pick(&[0, 1, 35, 48, 144, 191, 192, 193, 777, 1 << 20, 1 << 40, u64::MAX / 2, u64::MAX]);
+        "count" if lent.of == "vg_gaussian_arrays" => {
+            put(lent, source.pick(&[0, 1, 2, 3, 1 << 31, u64::MAX]))
+        }
+        "image.row_stride" | "mask.row_stride" | "depth.row_stride" | "color_row_stride"
+        | "depth_row_stride" => {
+            let row = source.pick(&[
+                0,
+                1,
+                35,
+                48,
+                144,
+                191,
+                192,
+                193,
+                777,
+                1 << 20,
+                1 << 40,
+                u64::MAX / 2,
+                u64::MAX,
+            ]);
             put(lent, row);
         }
-        _ if !field.tries.is_empty() && source.one_in(3) => put(lent, field.tries[source.below(field.tries.len())].0),
+        _ if !field.tries.is_empty() && source.one_in(3) => {
+            put(lent, field.tries[source.below(field.tries.len())].0)
+        }
         _ if field.size == 4 => {
             let float = u64::from(source.pick(&FLOATS).to_bits());
             put(lent, if source.one_in(2) { float } else { bits_of(source.pick(&NUMBERS)) });
@@ -331,7 +351,8 @@ fn whole<S: Source>(call: &mut Call, world: &World, source: &mut S) -> bool {
         }
         2 => {
             let k = source.pick(&[3, 7, 11]);
-            let metres = source.pick(&[1.0, -1.0]) * 10f64.powi(source.below(16) as i32 - 3);
+            let far = [1e-3, 0.1, 1.0, 10.0, 1e2, 1e3, 1e6, 1e9, 1e12, 1.1e12, 1e20, 1e39, 1e155, 1e300];
+            let metres: f64 = source.pick(&[1.0, -1.0]) * source.pick(&far);
             argument.put_in(element, &name("vehicle_from_camera"), k, metres.to_bits());
         }
         3 => {
@@ -361,8 +382,11 @@ fn spoil<S: Source>(call: &mut Call, source: &mut S) -> bool {
         return false;
     }
     let len = memory.content().len();
-    let count = if source.one_in(2) { 1 } else { 1 + source.below(64) };
-    let start = (source.bits() as usize % len) & !3;
+    let (count, start) = match source.below(4) {
+        0 => (len / 4, 0),
+        1 => (1 + source.below(64), (source.bits() as usize % len) & !3),
+        _ => (1, (source.bits() as usize % len) & !3),
+    };
     let value = source.pick(&FLOATS);
     for k in 0..count {
         let at = start + 4 * k;

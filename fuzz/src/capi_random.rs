@@ -42,7 +42,9 @@ fn main() {
         let begin = Instant::now();
         let mut source = Random(this);
         match catch_unwind(AssertUnwindSafe(|| capi::execute(&world, &mut source))) {
-            Ok(log) => log.into_iter().for_each(|(f, s)| *results.entry((f, format!("{s:?}"))).or_default() += 1),
+            Ok(log) => {
+                log.into_iter().for_each(|(f, s)| *results.entry((f, format!("{s:?}"))).or_default() += 1)
+            }
             Err(_) => {
                 eprintln!("again: capi_random = {this}");
                 failures += 1;

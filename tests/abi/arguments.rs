@@ -1024,6 +1024,42 @@ fn a_callback_may_stop_at_any_of_its_calls() {
     assert!(LINES.with_borrow(Vec::len) > 10);
 }
 
+#[test]
+fn depth_of_a_thousand_metres_is_told_to_the_log_and_nobody_else() {
+    let mut table = Table::new();
+    for make in [calls::colmap_open as fn(&World) -> Call, calls::transforms_open] {
+        LINES.with_borrow_mut(Vec::clear);
+        let in_metres = |call: &mut Call| {
+            call.lent("options").put("depth_scale", 0, 1.0f64.to_bits());
+            call.lent("options").put("log", 0, log as *const () as u64);
+        };
+        table.row(make, "millimetres taken for metres", in_metres, Fine);
+        let lines = LINES.take();
+        assert!(lines.iter().any(|line| line.contains("depth")), "{lines:?}");
+        let unheard = |call: &mut Call| call.lent("options").put("depth_scale", 0, 1.0f64.to_bits());
+        table.row(make, "nobody listens", unheard, Fine);
+    }
+}
+
+#[test]
+fn figures_tell_the_prior_and_its_box() {
+    let mut table = Table::new();
+    for (prior, has_box) in [(vg_prior::Given, 0), (vg_prior::Hull, 1)] {
+        let choose = |call: &mut Call| call.lent("options").put("prior", 0, prior as u64);
+        let made = table.row(calls::reconstruct, "a prior", choose, Fine);
+        let mut call = calls::report_get_figures(&table.world);
+        call.set("report", Value::Handle(made.handle("out_report")));
+        let done = call.run(true);
+        let bytes = done.memory[1].as_ref().unwrap().content();
+        let figures = unsafe { bytes.as_ptr().cast::<vg_report_figures>().read_unaligned() };
+        assert_eq!((figures.prior, figures.has_box, figures.has_input_error), (prior as i32, has_box, 1));
+        let count = unsafe { vg_gaussians_count(made.handle("out_gaussians") as _) };
+        assert_eq!((figures.gaussian_count, figures.views_used, figures.threads), (count as u64, 4, 2));
+        assert!((0..3).all(|k| figures.extent_low[k] < figures.extent_high[k]));
+        assert_eq!((figures.box_size != [0.0; 3]), has_box == 1);
+    }
+}
+
 /// What a callback that calls the library is told.
 struct Inner {
     world: *const World,
