@@ -89,9 +89,10 @@ pub(super) unsafe fn photograph(argument: &str, image: &vg_image) -> Result<(Rgb
     let picture = RgbImage::from_strided(argument, bytes, width, height, stride, format)?;
     let mask = match format {
         PixelFormat::Rgba8 | PixelFormat::Bgra8 => {
-            let row = |v: usize| &bytes[v * stride..][..width as usize * 4];
-            let alpha: Vec<u8> =
-                (0..height as usize).flat_map(|v| row(v).chunks_exact(4).map(|p| p[3])).collect();
+            let mut alpha = Vec::with_capacity(width as usize * height as usize);
+            for v in 0..height as usize {
+                alpha.extend(bytes[v * stride..][..width as usize * 4].chunks_exact(4).map(|p| p[3]));
+            }
             // As in picture files: alpha that hides nothing says nothing.
             match alpha.iter().all(|&a| a == u8::MAX) {
                 true => None,
@@ -125,11 +126,14 @@ pub(super) unsafe fn depth(argument: &str, image: &vg_image) -> Result<Option<De
     let only = [(vg_format::Depth32f as i32, "DEPTH32F", ())];
     read::choice(&format!("{argument}.format"), image.format, &only)?;
     let (bytes, stride) = unsafe { bytes(argument, image, FLOAT)? };
-    let row = |v: usize| &bytes[v * stride..][..image.width as usize * FLOAT];
-    // Read bytewise: rows need not be aligned to floats.
-    let depth = (0..image.height as usize)
-        .flat_map(|v| row(v).chunks_exact(FLOAT).map(|b| f32::from_ne_bytes([b[0], b[1], b[2], b[3]])));
-    DepthMap::new(image.width, image.height, depth.collect()).map(Some)
+    let (width, height) = (image.width as usize, image.height as usize);
+    let mut depth = Vec::with_capacity(width * height);
+    for v in 0..height {
+        // Read bytewise: rows need not be aligned to floats.
+        let row = bytes[v * stride..][..width * FLOAT].chunks_exact(FLOAT);
+        depth.extend(row.map(|b| f32::from_ne_bytes([b[0], b[1], b[2], b[3]])));
+    }
+    DepthMap::new(image.width, image.height, depth).map(Some)
 }
 
 /// All bytes from the first to the last pixel, and the stride, after checking that they can be counted.

@@ -1,8 +1,8 @@
 //! The C face. `include/vg.h` is generated from this folder, doc comments included, and is written for readers of C.
 //!
 //! Every function does the same four things: sets its out parameters to NULL, reads what it was given into the
-//! library's own types ([`read`]), calls the library, and hands the result out. All of it happens behind one panic
-//! guard ([`guard`]). Algorithms live elsewhere.
+//! library's own types (`read`), calls the library, and hands the result out. All of it happens behind one panic
+//! guard (`guard`). Algorithms live elsewhere.
 //!
 //! Rules that keep old programs running: functions and enumerators are added, never changed or removed; a struct
 //! that may grow begins with its size and grows at its end; enumerations travel as `int32_t`. `tests/abi` holds all

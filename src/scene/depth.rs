@@ -37,8 +37,9 @@ impl DepthMap {
         row_stride: usize,
     ) -> Result<Self> {
         let rows = strided_rows(argument, data, width, height, row_stride, 1)?;
-        let depth = rows.flatten().map(|&d| measured(d)).collect();
-        Ok(Self { width, height, depth, confidence: None })
+        let mut depth = Vec::with_capacity(width as usize * height as usize);
+        rows.for_each(|row| depth.extend(row.iter().map(|&d| measured(d))));
+        Ok(Self { width, height, depth: depth.into(), confidence: None })
     }
 
     /// The same with a confidence in [0, 1] per pixel.

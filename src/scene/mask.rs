@@ -45,11 +45,11 @@ impl Mask {
         row_stride: usize,
     ) -> Result<Self> {
         let rows = strided_rows(argument, data, width, height, row_stride, 1)?;
-        let labels = rows
-            .flatten()
-            .map(|&value| if value >= VEHICLE_THRESHOLD { Label::Vehicle } else { Label::Background })
-            .collect();
-        Ok(Self { width, height, labels })
+        let label = |&value: &u8| if value >= VEHICLE_THRESHOLD { Label::Vehicle } else { Label::Background };
+        // Row by row: an iterator over all pixels would not know its length, and is many times slower.
+        let mut labels = Vec::with_capacity(width as usize * height as usize);
+        rows.for_each(|row| labels.extend(row.iter().map(label)));
+        Ok(Self { width, height, labels: labels.into() })
     }
 
     /// Columns.
