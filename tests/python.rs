@@ -24,7 +24,8 @@ fn installed() -> Option<PathBuf> {
     let target = tools::target().parent()?.parent()?.to_owned();
     let environment = target.join("python");
     let python = environment.join("bin/python");
-    if !python.exists() {
+    // Debian's python3 without python3-venv leaves an environment without pip behind.
+    if !environment.join("bin/pip").exists() {
         let mut venv = Command::new("python3");
         let made = venv.args(["-m", "venv"]).arg(&environment).output();
         if !made.is_ok_and(|output| output.status.success()) {
