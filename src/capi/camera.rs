@@ -132,13 +132,14 @@ fn model(argument: &str, id: i32) -> Result<CameraModel> {
     })
 }
 
-/// Optional similarity from the world of the poses to the vehicle's frame.
-unsafe fn world(vehicle_from_world: *const f64) -> Result<Option<Similarity>> {
+/// A pose in the world, moved to the vehicle's frame by an optional similarity.
+unsafe fn in_vehicle(world_from_camera: Pose, vehicle_from_world: *const f64) -> Result<Pose> {
     if vehicle_from_world.is_null() {
-        return Ok(None);
+        return Ok(world_from_camera);
     }
     let matrix = unsafe { read::fixed("vehicle_from_world", vehicle_from_world)? };
-    Similarity::from_row_major("vehicle_from_world", &matrix).map(Some)
+    let vehicle_from_world = Similarity::from_row_major("vehicle_from_world", &matrix)?;
+    Ok(vehicle_from_world.transform_pose(&world_from_camera))
 }
 
 unsafe fn optional_pose(argument: &str, pose: *const f64) -> Result<Pose> {
@@ -313,8 +314,7 @@ pub unsafe extern "C" fn vg_pose_from_colmap(
             read::not_null("out", out, "12 numbers")?;
             let (qvec, tvec) = (read::fixed("qvec", qvec)?, read::fixed("tvec", tvec)?);
             let pose = frame::pose_from_colmap("qvec, tvec", qvec, tvec)?;
-            let world = world(vehicle_from_world)?;
-            write_pose(out, &world.map_or(pose, |w| w.transform_pose(&pose)))
+            write_pose(out, &in_vehicle(pose, vehicle_from_world)?)
         })
     }
 }
@@ -337,8 +337,7 @@ pub unsafe extern "C" fn vg_pose_from_opengl(
             read::not_null("out", out, "12 numbers")?;
             let matrix = read::fixed("camera_to_world", camera_to_world)?;
             let pose = frame::pose_from_opengl("camera_to_world", &matrix)?;
-            let world = world(vehicle_from_world)?;
-            write_pose(out, &world.map_or(pose, |w| w.transform_pose(&pose)))
+            write_pose(out, &in_vehicle(pose, vehicle_from_world)?)
         })
     }
 }

@@ -1,6 +1,6 @@
 //! What outlives a call: worker threads and the renderer's memory.
 
-use super::guard::{clear, guarded, guarded_value};
+use super::guard::{clear, free, guarded, guarded_value};
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
 use crate::error::Result;
@@ -115,9 +115,5 @@ pub unsafe extern "C" fn vg_context_threads(context: *const vg_context) -> u32 {
 /// Ends the context's threads and frees its memory. No call may be using it. NULL: nothing happens.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn vg_context_free(context: *mut vg_context) {
-    guarded_value((), || {
-        if !context.is_null() {
-            drop(unsafe { Box::from_raw(context.cast::<Workshop>()) });
-        }
-    });
+    unsafe { free(context.cast::<Workshop>()) }
 }

@@ -1,6 +1,6 @@
 //! Gaussians: borrowed arrays, files, and what can be made of them.
 
-use super::guard::{clear, guarded, guarded_value};
+use super::guard::{clear, free, guarded, guarded_value};
 use super::options::sh_degree;
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
@@ -105,9 +105,8 @@ pub unsafe extern "C" fn vg_gaussians_sh_degree(gaussians: *const vg_gaussians) 
 
 /// A borrowed array; NULL where there is nothing in it.
 unsafe fn borrowed<T>(gaussians: *const vg_gaussians, array: impl FnOnce(&Gaussians) -> &[T]) -> *const f32 {
-    guarded_value(std::ptr::null(), || match unsafe { get(gaussians) }.map(array) {
-        None | Some([]) => std::ptr::null(),
-        Some(values) => values.as_ptr().cast(),
+    guarded_value(std::ptr::null(), || {
+        unsafe { get(gaussians) }.map_or(std::ptr::null(), |g| read::address(array(g)))
     })
 }
 
@@ -296,11 +295,7 @@ pub unsafe extern "C" fn vg_gaussians_merge(
 /// Frees Gaussians. Pointers into them end. NULL: nothing happens.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn vg_gaussians_free(gaussians: *mut vg_gaussians) {
-    guarded_value((), || {
-        if !gaussians.is_null() {
-            drop(unsafe { Box::from_raw(gaussians.cast::<Gaussians>()) });
-        }
-    });
+    unsafe { free(gaussians.cast::<Gaussians>()) }
 }
 
 unsafe fn make(

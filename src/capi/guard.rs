@@ -55,6 +55,15 @@ pub(super) unsafe fn clear<T>(out: *mut *mut T) {
     }
 }
 
+/// Frees what a handle points to, whose type is `T`; NULL is nothing.
+pub(super) unsafe fn free<T>(handle: *mut T) {
+    guarded_value((), || {
+        if !handle.is_null() {
+            drop(unsafe { Box::from_raw(handle) });
+        }
+    });
+}
+
 fn caught<T>(body: impl FnOnce() -> T) -> Result<T, Failure> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

@@ -78,8 +78,7 @@ impl AsRef<[u8]> for Lent {
 /// must not outlive the call.
 pub(super) unsafe fn photograph(argument: &str, image: &vg_image) -> Result<(RgbImage, Option<Mask>)> {
     read::not_null(&format!("{argument}.data"), image.data, "the picture's pixels")?;
-    read::zero(&format!("{argument}.flags"), image.flags == 0)?;
-    let format = read::choice(&format!("{argument}.format"), image.format, &PIXELS)?;
+    let format = format_of(argument, image, &PIXELS)?;
     let (bytes, stride) = unsafe { bytes(argument, image, format.bytes_per_pixel())? };
     let (width, height) = (image.width, image.height);
     if format == PixelFormat::Rgb8 && stride == width as usize * 3 {
@@ -109,9 +108,7 @@ pub(super) unsafe fn mask(argument: &str, image: &vg_image) -> Result<Option<Mas
     if image.data.is_null() {
         return Ok(None);
     }
-    read::zero(&format!("{argument}.flags"), image.flags == 0)?;
-    let only = [(vg_format::Gray8 as i32, "GRAY8", ())];
-    read::choice(&format!("{argument}.format"), image.format, &only)?;
+    format_of(argument, image, &[(vg_format::Gray8 as i32, "GRAY8", ())])?;
     let (bytes, stride) = unsafe { bytes(argument, image, 1)? };
     Mask::from_strided(argument, bytes, image.width, image.height, stride).map(Some)
 }
@@ -122,9 +119,7 @@ pub(super) unsafe fn depth(argument: &str, image: &vg_image) -> Result<Option<De
     if image.data.is_null() {
         return Ok(None);
     }
-    read::zero(&format!("{argument}.flags"), image.flags == 0)?;
-    let only = [(vg_format::Depth32f as i32, "DEPTH32F", ())];
-    read::choice(&format!("{argument}.format"), image.format, &only)?;
+    format_of(argument, image, &[(vg_format::Depth32f as i32, "DEPTH32F", ())])?;
     let (bytes, stride) = unsafe { bytes(argument, image, FLOAT)? };
     let (width, height) = (image.width as usize, image.height as usize);
     let mut depth = Vec::with_capacity(width * height);
@@ -134,6 +129,12 @@ pub(super) unsafe fn depth(argument: &str, image: &vg_image) -> Result<Option<De
         depth.extend(row.map(|b| f32::from_ne_bytes([b[0], b[1], b[2], b[3]])));
     }
     DepthMap::new(image.width, image.height, depth).map(Some)
+}
+
+/// The picture's format, one of these, and nothing in it that a later version may have a meaning for.
+fn format_of<T: Copy>(argument: &str, image: &vg_image, formats: &[(i32, &str, T)]) -> Result<T> {
+    read::zero(&format!("{argument}.flags"), image.flags == 0)?;
+    read::choice(&format!("{argument}.format"), image.format, formats)
 }
 
 /// All bytes from the first to the last pixel, and the stride, after checking that they can be counted.

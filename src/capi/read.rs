@@ -200,6 +200,11 @@ pub(super) unsafe fn fixed<const N: usize>(argument: &str, pointer: *const f64) 
     Ok(unsafe { pointer.cast::<[f64; N]>().read_unaligned() })
 }
 
+/// The address of numbers that are lent to the caller; NULL where there are none.
+pub(super) fn address<T, U>(values: &[T]) -> *const U {
+    if values.is_empty() { std::ptr::null() } else { values.as_ptr().cast() }
+}
+
 /// A number of an enumeration, checked.
 pub(super) fn choice<T: Copy>(argument: &str, number: i32, choices: &[(i32, &str, T)]) -> Result<T> {
     choices.iter().find(|(n, ..)| *n == number).map(|(.., value)| *value).ok_or_else(|| {

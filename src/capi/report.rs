@@ -1,6 +1,6 @@
 //! What a reconstruction did.
 
-use super::guard::{guarded, guarded_value};
+use super::guard::{free, guarded, guarded_value};
 use super::options::vg_prior;
 use super::read::{self, Versioned};
 use super::status::{c_string, vg_error, vg_status};
@@ -172,9 +172,7 @@ pub unsafe extern "C" fn vg_report_point_count(report: *const vg_report) -> usiz
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn vg_report_point_positions(report: *const vg_report) -> *const f32 {
     guarded_value(std::ptr::null(), || {
-        unsafe { object(report) }
-            .filter(|r| !r.points.positions.is_empty())
-            .map_or(std::ptr::null(), |r| r.points.positions.as_ptr().cast())
+        unsafe { object(report) }.map_or(std::ptr::null(), |r| read::address(&r.points.positions))
     })
 }
 
@@ -182,18 +180,12 @@ pub unsafe extern "C" fn vg_report_point_positions(report: *const vg_report) -> 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn vg_report_point_colors(report: *const vg_report) -> *const u8 {
     guarded_value(std::ptr::null(), || {
-        unsafe { object(report) }
-            .filter(|r| !r.points.colors.is_empty())
-            .map_or(std::ptr::null(), |r| r.points.colors.as_ptr().cast())
+        unsafe { object(report) }.map_or(std::ptr::null(), |r| read::address(&r.points.colors))
     })
 }
 
 /// Frees a report. NULL: nothing happens.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn vg_report_free(report: *mut vg_report) {
-    guarded_value((), || {
-        if !report.is_null() {
-            drop(unsafe { Box::from_raw(report.cast::<ReportObject>()) });
-        }
-    });
+    unsafe { free(report.cast::<ReportObject>()) }
 }

@@ -2,7 +2,7 @@
 
 use super::camera::vg_camera;
 use super::context::{Workshop, in_context, vg_context};
-use super::guard::{clear, guarded, guarded_value};
+use super::guard::{clear, free, guarded, guarded_value};
 use super::image::{vg_format, vg_image};
 use super::options::{Log, vg_log_fn, vg_log_level};
 use super::read::{self, Versioned};
@@ -252,9 +252,5 @@ fn lent(view: &View, name: &CString) -> vg_view {
 /// Frees a scene. Pointers into it end. NULL: nothing happens.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn vg_scene_free(scene: *mut vg_scene) {
-    guarded_value((), || {
-        if !scene.is_null() {
-            drop(unsafe { Box::from_raw(scene.cast::<SceneObject>()) });
-        }
-    });
+    unsafe { free(scene.cast::<SceneObject>()) }
 }

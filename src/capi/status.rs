@@ -1,6 +1,6 @@
 //! What functions return, and the error object that says why.
 
-use super::guard::{Failure, guarded_value};
+use super::guard::{Failure, free, guarded_value};
 use crate::error::Error;
 use std::ffi::{CString, c_char};
 
@@ -45,7 +45,7 @@ impl vg_error {
     pub(super) fn new(failure: Failure) -> ErrorObject {
         let (status, message) = match failure {
             Failure::Panicked(message) => (vg_status::Internal, message),
-            Failure::Refused(error) => (status_of(&error), error.to_string()),
+            Failure::Refused(error) => (vg_status::from(&error), error.to_string()),
         };
         ErrorObject { status, message: c_string(one_line(&message)) }
     }
@@ -61,15 +61,17 @@ impl ErrorObject {
     }
 }
 
-/// The numbers C sees for the library's errors.
-pub(crate) fn status_of(error: &Error) -> vg_status {
-    match error {
-        Error::Argument { .. } => vg_status::Argument,
-        Error::Format { .. } => vg_status::Format,
-        Error::Io { .. } => vg_status::Io,
-        Error::Reconstruction { .. } => vg_status::Reconstruction,
-        Error::Cancelled { .. } => vg_status::Cancelled,
-        Error::NotBuilt { .. } => vg_status::NotBuilt,
+/// The numbers that C, and the bindings of other languages, give the library's errors.
+impl From<&Error> for vg_status {
+    fn from(error: &Error) -> Self {
+        match error {
+            Error::Argument { .. } => Self::Argument,
+            Error::Format { .. } => Self::Format,
+            Error::Io { .. } => Self::Io,
+            Error::Reconstruction { .. } => Self::Reconstruction,
+            Error::Cancelled { .. } => Self::Cancelled,
+            Error::NotBuilt { .. } => Self::NotBuilt,
+        }
     }
 }
 
@@ -110,9 +112,5 @@ pub unsafe extern "C" fn vg_error_message(error: *const vg_error) -> *const c_ch
 /// Frees an error. NULL: nothing happens.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn vg_error_free(error: *mut vg_error) {
-    guarded_value((), || {
-        if !error.is_null() {
-            drop(unsafe { Box::from_raw(error.cast::<ErrorObject>()) });
-        }
-    });
+    unsafe { free(error.cast::<ErrorObject>()) }
 }

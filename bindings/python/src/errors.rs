@@ -7,20 +7,9 @@ use pyo3::types::PyType;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError};
+/// Numbers of `vehicle_gaussians.Status`.
+pub(crate) use vg::capi::vg_status as Status;
 use vg::progress::Threads;
-
-/// Numbers of `vehicle_gaussians.Status`, which are the C library's.
-#[derive(Clone, Copy)]
-#[repr(i32)]
-pub(crate) enum Status {
-    Argument = 1,
-    Format = 2,
-    Io = 3,
-    Reconstruction = 4,
-    Cancelled = 5,
-    NotBuilt = 6,
-    Internal = 7,
-}
 
 /// Text and place of the last panic, for the message that its payload alone cannot give.
 static LAST_PANIC: Mutex<Option<(String, String)>> = Mutex::new(None);
@@ -46,15 +35,7 @@ pub(crate) fn bad_type(argument: &str, found: &str, allowed: &str) -> PyErr {
 
 /// The library's error with the arguments' names in Python.
 pub(crate) fn from_library(py: Python<'_>, error: vg::Error) -> PyErr {
-    let status = match &error {
-        vg::Error::Argument { .. } => Status::Argument,
-        vg::Error::Format { .. } => Status::Format,
-        vg::Error::Io { .. } => Status::Io,
-        vg::Error::Reconstruction { .. } => Status::Reconstruction,
-        vg::Error::NotBuilt { .. } => Status::NotBuilt,
-        vg::Error::Cancelled { .. } => Status::Cancelled,
-        _ => Status::Internal,
-    };
+    let status = Status::from(&error);
     let message = match error {
         vg::Error::Argument { argument, found, allowed } => {
             let argument = argument.strip_prefix("options.").unwrap_or(&argument);
