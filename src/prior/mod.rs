@@ -3,6 +3,7 @@
 pub mod given;
 pub mod hull;
 pub mod normals;
+pub(crate) mod volume;
 
 pub use given::GivenDepth;
 pub use hull::HullPrior;

@@ -12,7 +12,7 @@ const GRAZING_CONFIDENCE: f32 = 0.5;
 
 /// Planar depth of every vehicle pixel of `view`. A ray that misses the hull (poses or masks a little off)
 /// takes the depth where it comes closest, so that every vehicle pixel is filled, with lower confidence.
-pub(super) fn march(view: &View, field: &Field) -> Result<DepthMap> {
+pub(crate) fn march(view: &View, field: &Field) -> Result<DepthMap> {
     let camera = &view.camera;
     let mask = view.mask.as_ref().expect("hull views have masks");
     let width = camera.width as usize;

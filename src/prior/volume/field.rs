@@ -7,7 +7,7 @@ use rayon::prelude::*;
 const CLAMP_M: f32 = 1.0;
 
 /// How far inside the hull each grid point is, metres, negative outside.
-pub(super) struct Field {
+pub(crate) struct Field {
     low: Vec3,
     voxel: f32,
     /// Points along x, y, z.
@@ -19,7 +19,7 @@ pub(super) struct Field {
 impl Field {
     /// Evaluates `inside` at the points of a grid of spacing `voxel` over the box `low..high`, which is
     /// symmetric in y, and at their mirror points, keeping the smaller value (the mirrored twins carve too).
-    pub(super) fn carve(low: DVec3, high: DVec3, voxel: f64, inside: impl Fn(Vec3) -> f32 + Sync) -> Self {
+    pub(crate) fn carve(low: DVec3, high: DVec3, voxel: f64, inside: impl Fn(Vec3) -> f32 + Sync) -> Self {
         let size: [usize; 3] = std::array::from_fn(|k| ((high[k] - low[k]) / voxel).ceil() as usize + 1);
         let [nx, ny, nz] = size;
         let half_width = 0.5 * (ny - 1) as f64 * voxel;
@@ -48,7 +48,7 @@ impl Field {
 
     /// Replaces every value by the mean over the cube that reaches `radius` metres (rounded to grid points) to
     /// either side, cut at the border of the grid.
-    pub(super) fn smooth(&mut self, radius: f32) {
+    pub(crate) fn smooth(&mut self, radius: f32) {
         let reach = (radius / self.voxel).round() as usize;
         let [nx, ny, nz] = self.size;
         // A mean over a cube is a mean along each axis in turn.
@@ -68,18 +68,18 @@ impl Field {
     }
 
     /// Grid spacing, metres.
-    pub(super) fn voxel(&self) -> f32 {
+    pub(crate) fn voxel(&self) -> f32 {
         self.voxel
     }
 
     /// Lowest and highest grid point.
-    pub(super) fn bounds(&self) -> (Vec3, Vec3) {
+    pub(crate) fn bounds(&self) -> (Vec3, Vec3) {
         let extent = Vec3::from_array(self.size.map(|n| (n - 1) as f32)) * self.voxel;
         (self.low, self.low + extent)
     }
 
     /// Trilinear value; outside the grid the nearest point's.
-    pub(super) fn sample(&self, p: Vec3) -> f32 {
+    pub(crate) fn sample(&self, p: Vec3) -> f32 {
         let [nx, ny, nz] = self.size;
         let g = ((p - self.low) / self.voxel)
             .clamp(Vec3::ZERO, Vec3::new((nx - 1) as f32, (ny - 1) as f32, (nz - 1) as f32));
@@ -99,7 +99,7 @@ impl Field {
     }
 
     /// Lowest and highest grid point whose value exceeds `level`, or `None` if there is none.
-    pub(super) fn bounds_above(&self, level: f32) -> Option<(DVec3, DVec3)> {
+    pub(crate) fn bounds_above(&self, level: f32) -> Option<(DVec3, DVec3)> {
         let [nx, ny, _] = self.size;
         let mut bounds: Option<([usize; 3], [usize; 3])> = None;
         for (index, _) in self.values.iter().enumerate().filter(|(_, v)| **v > level) {

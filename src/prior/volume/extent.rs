@@ -23,7 +23,7 @@ const SEARCH_POINTS: f64 = 72.0;
 
 /// Finds the box by carving coarsely, each time in what was left of the box before: first in a cube around where
 /// the views look.
-pub(super) fn estimate_box(views: &[View], inside: impl Fn(Vec3) -> f32 + Sync) -> Result<VehicleBox> {
+pub(crate) fn estimate_box(views: &[View], inside: impl Fn(Vec3) -> f32 + Sync) -> Result<VehicleBox> {
     let center = meeting_point(views);
     let radius = search_radius(views, center)?;
     let y = radius.min(0.5 * LARGEST_M.y);
@@ -142,7 +142,7 @@ fn search_radius(views: &[View], center: DVec3) -> Result<f64> {
 }
 
 /// The caller's size placed where the silhouettes are: same middle along x, same ground.
-pub(super) fn place_box(size: [f64; 3], estimated: &VehicleBox) -> VehicleBox {
+pub(crate) fn place_box(size: [f64; 3], estimated: &VehicleBox) -> VehicleBox {
     let middle = 0.5 * (estimated.low[0] + estimated.high[0]);
     let ground = estimated.low[2];
     VehicleBox {
@@ -153,7 +153,7 @@ pub(super) fn place_box(size: [f64; 3], estimated: &VehicleBox) -> VehicleBox {
 }
 
 /// How far inside the box `p` is, metres.
-pub(super) fn inside_box(vehicle_box: &VehicleBox, p: Vec3) -> f32 {
+pub(crate) fn inside_box(vehicle_box: &VehicleBox, p: Vec3) -> f32 {
     let p = p.to_array();
     (0..3)
         .map(|k| (p[k] - vehicle_box.low[k] as f32).min(vehicle_box.high[k] as f32 - p[k]))
@@ -161,6 +161,6 @@ pub(super) fn inside_box(vehicle_box: &VehicleBox, p: Vec3) -> f32 {
 }
 
 /// All silhouettes' verdict: how far inside all cones.
-pub(super) fn inside_all(silhouettes: &[Silhouette], p: Vec3) -> f32 {
+pub(crate) fn inside_all(silhouettes: &[Silhouette], p: Vec3) -> f32 {
     silhouettes.iter().map(|s| s.inside(p)).fold(f32::INFINITY, f32::min)
 }

@@ -9,19 +9,12 @@
 //! level is taken. A ray that then passes the surface by takes the depth where it comes closest to it, so that
 //! every mask is filled.
 
-mod extent;
-mod field;
-mod march;
-mod silhouette;
-
+use super::volume::{Field, Silhouette, estimate_box, inside_all, inside_box, march, place_box};
 use super::{DepthPrior, Geometry, VehicleBox};
 use crate::error::{Error, Result};
 use crate::progress::Context;
 use crate::scene::View;
-use extent::{estimate_box, inside_all, inside_box, place_box};
-use field::Field;
 use rayon::prelude::*;
-use silhouette::Silhouette;
 
 /// Finest useful grid spacing, metres: a pixel's footprint at the usual distances.
 const FINEST_VOXEL_M: f64 = 0.02;
