@@ -13,7 +13,7 @@ use vg::scene::{Mask, Scene, View};
 fn estimate(scene: &Scene, size: Option<[f64; 3]>) -> Geometry {
     let mut proceed = |_| ControlFlow::Continue(());
     let threads = Threads::new(2).unwrap();
-    HullPrior { size }.estimate(&scene.views, &Context::new(&threads, &mut proceed)).unwrap()
+    HullPrior { size, cloud: None }.estimate(&scene.views, &Context::new(&threads, &mut proceed)).unwrap()
 }
 
 /// Depth of the hull minus true depth, pixel by pixel, for view i.
@@ -55,7 +55,7 @@ fn the_estimated_box_holds_the_vehicle_and_little_more() {
 #[test]
 fn a_given_box_narrows_the_hull_and_is_reported_as_given() {
     // Two views of the flank bound the width loosely.
-    let scene = Scene { views: right_side(320, 240).views[1..3].to_vec() };
+    let scene = Scene { views: right_side(320, 240).views[1..3].to_vec(), cloud: None };
     let mean = |geometry: &Geometry| -> f32 {
         let all: Vec<f32> = (0..2).flat_map(|i| excess(&scene, geometry, i)).map(f32::abs).collect();
         all.iter().sum::<f32>() / all.len() as f32
@@ -115,7 +115,7 @@ fn a_mask_cut_by_the_border_carves_nothing_beyond_it() {
 
 #[test]
 fn one_side_view_alone_gets_a_plausible_width() {
-    let scene = Scene { views: vec![view("side", camera(-90.0, 6.5, 320, 240))] };
+    let scene = Scene { views: vec![view("side", camera(-90.0, 6.5, 320, 240))], cloud: None };
     let size = estimate(&without_depth(scene), None).vehicle_box.unwrap().size();
     assert!(size[1] > 1.5 && size[1] < 2.6, "{size:?}");
 }

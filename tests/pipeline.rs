@@ -208,6 +208,7 @@ fn a_floating_pixel_between_two_surfaces_is_left_out() {
 fn views_from_one_direction_support_no_view_dependence() {
     let narrow = Scene {
         views: vec![view("a", camera(-90.0, 6.5, 160, 120)), view("b", camera(-93.0, 6.5, 160, 120))],
+        cloud: None,
     };
     let made = run(&narrow, &Options::default());
     assert_eq!(made.gaussians.sh_degree(), 0);
@@ -218,7 +219,8 @@ fn views_from_one_direction_support_no_view_dependence() {
 #[test]
 fn where_both_sides_are_seen_nothing_is_cloned_but_what_is_missing() {
     let around = |a: &f64| view(&format!("{a}"), camera(*a, 6.5, 160, 120));
-    let scene = Scene { views: [-140.0, -90.0, -40.0, 40.0, 90.0, 140.0].iter().map(around).collect() };
+    let scene =
+        Scene { views: [-140.0, -90.0, -40.0, 40.0, 90.0, 140.0].iter().map(around).collect(), cloud: None };
     let both = run(&scene, &Options::default());
     let one = run(&right_side(160, 120), &Options::default());
     let share = |r: &Reconstruction| r.report.symmetry.cloned as f64 / r.report.gaussians as f64;
@@ -270,7 +272,7 @@ fn one_to_sixty_four_views_give_a_vehicle() {
     for n in [1, 2, 3, 8, 64] {
         let azimuth = |i: usize| -20.0 - 140.0 * (i as f64 + 0.5) / n as f64;
         let views = (0..n).map(|i| view(&i.to_string(), camera(azimuth(i), 6.5, 80, 60))).collect();
-        let scene = Scene { views };
+        let scene = Scene { views, cloud: None };
         for prior in [PriorChoice::Given, PriorChoice::Hull] {
             let made = run(&scene, &Options { prior, ..Options::default() });
             assert!(made.report.gaussians > 500 && is_finite(&made), "{n} views, {prior:?}");
@@ -280,7 +282,7 @@ fn one_to_sixty_four_views_give_a_vehicle() {
 
 #[test]
 fn pictures_of_one_pixel_and_masks_of_one_pixel_do_not_break_it() {
-    let tiny = Scene { views: vec![view("tiny", camera(-90.0, 6.5, 1, 1))] };
+    let tiny = Scene { views: vec![view("tiny", camera(-90.0, 6.5, 1, 1))], cloud: None };
     for scene in [tiny.clone(), without_depth(tiny)] {
         match reconstruct(&scene, &Options::default(), &mut |_| ControlFlow::Continue(())) {
             Ok(made) => assert!(is_finite(&made)),

@@ -19,6 +19,8 @@ pub struct ViewErrors {
     /// Mean absolute difference of depth, metres, where the view has depth and alpha >= 0.5; `None` where
     /// that is nowhere.
     pub depth_mae_m: Option<f64>,
+    /// 90th percentile of that difference, metres: how wrong the worst tenth is at least.
+    pub depth_p90_m: Option<f64>,
 }
 
 impl ViewErrors {
@@ -30,12 +32,14 @@ impl ViewErrors {
             Some(mask) => mask.bounds(),
             None => Some([0, 0, width - 1, rendered.height - 1]),
         };
+        let depth = depth_differences(rendered, view);
         Self {
             psnr_db: psnr(&rendered.color, &truth),
             ssim: ssim(&rendered.color, &truth, width, rendered.height),
             psnr_box_db: bounds.map(|b| psnr_in(&rendered.color, &truth, width, b)),
             silhouette_iou: silhouette_iou(&rendered.alpha, view),
-            depth_mae_m: depth_mae(rendered, view),
+            depth_mae_m: mean(depth.iter().copied()),
+            depth_p90_m: percentile_90(depth),
         }
     }
 
@@ -48,6 +52,7 @@ impl ViewErrors {
             psnr_box_db: of(&|e| e.psnr_box_db),
             silhouette_iou: of(&|e| Some(e.silhouette_iou))?,
             depth_mae_m: of(&|e| e.depth_mae_m),
+            depth_p90_m: of(&|e| e.depth_p90_m),
         })
     }
 }
@@ -58,11 +63,17 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 /// Where a silhouette ends is the IoU's affair: both must show the vehicle.
-fn depth_mae(rendered: &Rendered, view: &View) -> Option<f64> {
-    let truth = view.depth.as_ref()?.depth();
+fn depth_differences(rendered: &Rendered, view: &View) -> Vec<f64> {
+    let Some(truth) = view.depth.as_ref().map(crate::scene::DepthMap::depth) else { return Vec::new() };
     let pixels = truth.iter().zip(&rendered.depth).zip(&rendered.alpha);
     let both = pixels.filter(|((truth, _), alpha)| **truth > 0.0 && **alpha >= 0.5);
-    mean(both.map(|((truth, drawn), _)| f64::from(truth - drawn).abs()))
+    both.map(|((truth, drawn), _)| f64::from(truth - drawn).abs()).collect()
+}
+
+/// The smallest value that nine tenths of all do not exceed; `None` of nothing.
+fn percentile_90(mut values: Vec<f64>) -> Option<f64> {
+    let rank = (9 * values.len()).div_ceil(10).checked_sub(1)?;
+    Some(*values.select_nth_unstable_by(rank, f64::total_cmp).1)
 }
 
 #[cfg(test)]
@@ -97,7 +108,16 @@ mod tests {
         let errors = ViewErrors::of(&drawn(), &view(Some(vec![2.0, 1.0])));
         assert_eq!((errors.psnr_db, errors.psnr_box_db), (f64::INFINITY, Some(f64::INFINITY)));
         assert_eq!((errors.silhouette_iou, errors.ssim), (1.0, None));
-        assert_eq!(errors.depth_mae_m, Some(0.5));
+        assert_eq!((errors.depth_mae_m, errors.depth_p90_m), (Some(0.5), Some(0.5)));
+    }
+
+    #[test]
+    fn nine_tenths_do_not_exceed_the_percentile() {
+        let of = |n: u32| percentile_90((1..=n).rev().map(f64::from).collect());
+        assert_eq!(
+            (of(0), of(1), of(10), of(11), of(100)),
+            (None, Some(1.0), Some(9.0), Some(10.0), Some(90.0))
+        );
     }
 
     #[test]

@@ -4,8 +4,8 @@ use super::options::{Keep, Options, PriorChoice};
 use super::report::LeftOut;
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
-use crate::prior::Geometry;
-use crate::scene::{Scene, View};
+use crate::prior::{Geometry, PointFit};
+use crate::scene::{Cloud, Scene, View};
 use glam::DVec3;
 
 /// Cameras nearer to each other than this, looking the same way, show the same.
@@ -89,6 +89,14 @@ pub(super) fn sh_degree(
     let why = format!("the views span {spread:.0} degrees, too few to tell these bands apart");
     note(left_out, "SH bands", &why, usize::from(options.sh_degree - degree));
     degree
+}
+
+/// Points of the cloud that moved no surface.
+pub(super) fn note_cloud(left_out: &mut Vec<LeftOut>, cloud: &Cloud, fit: Option<PointFit>) {
+    match fit {
+        Some(fit) => note(left_out, "points", "outside the silhouettes: not the vehicle's", fit.outside),
+        None => note(left_out, "points", "the depth is given, not estimated", cloud.points().len()),
+    }
 }
 
 pub(super) fn note(left_out: &mut Vec<LeftOut>, what: &str, why: &str, count: usize) {

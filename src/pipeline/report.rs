@@ -1,7 +1,7 @@
 //! What a reconstruction did, how long it took, what it left out, and the error it can know.
 
 use super::options::Options;
-use crate::prior::{BoxSource, VehicleBox};
+use crate::prior::{BoxSource, Filled, PointFit, VehicleBox};
 use crate::symmetry::Completion;
 use serde::Serialize;
 use std::time::Instant;
@@ -80,6 +80,10 @@ pub struct Report {
     /// The box the prior worked in.
     #[serde(rename = "box")]
     pub vehicle_box: Option<BoxReport>,
+    /// What the prior made of the scene's cloud.
+    pub cloud: Option<PointFit>,
+    /// How the prior closed what its surface left open of the masks.
+    pub masks: Option<Filled>,
     /// Work this scene did not need.
     pub left_out: Vec<LeftOut>,
     /// How the unseen side was completed.

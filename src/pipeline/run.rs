@@ -68,9 +68,12 @@ pub fn reconstruct_on<'a>(
     clock.lap("undistort");
 
     context.report("prior", 0.0)?;
-    let prior = chosen_prior(plan::prior(&views, options), options);
+    let prior = chosen_prior(plan::prior(&views, options), scene, options);
     let mut geometry = prior.estimate(&views, &context)?;
     geometry.find_normals(&views, &context);
+    if let Some(cloud) = &scene.cloud {
+        plan::note_cloud(&mut left_out, cloud, geometry.points);
+    }
     clock.lap("prior");
 
     context.report("pixels", 0.0)?;
@@ -115,6 +118,8 @@ pub fn reconstruct_on<'a>(
         extent_m: gaussians.bounds(),
         views_used: views.iter().map(|v| v.name.clone()).collect(),
         vehicle_box: geometry.vehicle_box.map(Into::into),
+        cloud: geometry.points,
+        masks: geometry.masks,
         left_out,
         symmetry: completion,
         input_error,
@@ -127,10 +132,12 @@ fn undistorted(scene: &Scene, used: &[usize], context: &Context) -> Result<Vec<V
     context.parallel(|| used.par_iter().map(|&i| undistort::undistorted(&scene.views[i])).collect())
 }
 
-fn chosen_prior(choice: PriorChoice, options: &Options) -> Box<dyn DepthPrior> {
+fn chosen_prior(choice: PriorChoice, scene: &Scene, options: &Options) -> Box<dyn DepthPrior> {
     match choice {
         PriorChoice::Given => Box::new(GivenDepth),
-        PriorChoice::Hull | PriorChoice::Auto => Box::new(HullPrior { size: options.vehicle_size }),
+        PriorChoice::Hull | PriorChoice::Auto => {
+            Box::new(HullPrior { size: options.vehicle_size, cloud: scene.cloud.clone() })
+        }
     }
 }
 

@@ -7,6 +7,7 @@ pub(crate) mod volume;
 
 pub use given::GivenDepth;
 pub use hull::HullPrior;
+pub use volume::{Filled, PointFit};
 
 use crate::error::Result;
 use crate::progress::Context;
@@ -33,12 +34,16 @@ pub struct Geometry {
     pub normals: Vec<Vec<Vec3>>,
     /// The box it worked in.
     pub vehicle_box: Option<VehicleBox>,
+    /// What it made of the scene's cloud, where there is one and it has a use for it.
+    pub points: Option<PointFit>,
+    /// How it closed what its surface left open of the masks, where it does.
+    pub masks: Option<Filled>,
 }
 
 impl Geometry {
     /// Depth without normals yet.
     pub fn new(depths: Vec<DepthMap>, vehicle_box: Option<VehicleBox>) -> Self {
-        Self { depths, normals: Vec::new(), vehicle_box }
+        Self { depths, normals: Vec::new(), vehicle_box, points: None, masks: None }
     }
 
     /// About the middle of what the views see, vehicle frame, metres: the mean of some lifted pixels.

@@ -1,5 +1,6 @@
 //! What a reconstruction starts from: views, each an image, a mask, a camera, and depth where it was measured.
 
+pub mod cloud;
 pub mod depth;
 pub mod image;
 pub mod mask;
@@ -7,6 +8,7 @@ pub mod undistort;
 pub mod view;
 pub mod visibility;
 
+pub use cloud::Cloud;
 pub use depth::DepthMap;
 pub use image::{PixelFormat, RgbImage};
 pub use mask::Mask;

@@ -1,6 +1,6 @@
 //! A view and a scene, and what makes them valid.
 
-use super::{DepthMap, Mask, RgbImage};
+use super::{Cloud, DepthMap, Mask, RgbImage};
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use glam::{DVec3, Vec3};
@@ -23,11 +23,13 @@ pub struct View {
     pub depth: Option<DepthMap>,
 }
 
-/// Views of one vehicle in its own frame.
+/// Views of one vehicle in its own frame, and what else was measured of it.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     /// In the caller's order.
     pub views: Vec<View>,
+    /// Points on the vehicle, where some were measured; priors that estimate the surface move it there.
+    pub cloud: Option<Cloud>,
 }
 
 impl View {

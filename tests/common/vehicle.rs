@@ -48,7 +48,10 @@ pub fn view(name: &str, camera: Camera) -> View {
 /// Four views of the right side.
 pub fn right_side(width: u32, height: u32) -> Scene {
     let views = [-40.0, -75.0, -105.0, -140.0];
-    Scene { views: views.iter().map(|a| view(&format!("{a}"), camera(*a, 6.5, width, height))).collect() }
+    Scene {
+        views: views.iter().map(|a| view(&format!("{a}"), camera(*a, 6.5, width, height))).collect(),
+        cloud: None,
+    }
 }
 
 /// The scene without depth.

@@ -48,6 +48,9 @@ pub(crate) struct MethodArgs {
     /// Highest degree of the spherical harmonics that hold the colour
     #[arg(long, value_name = "0..3", default_value_t = 2, value_parser = clap::value_parser!(u8).range(0..=3))]
     sh_degree: u8,
+    /// Points measured on the vehicle, PLY in its frame, metres: a surface that is estimated is moved to them
+    #[arg(long, value_name = "P.ply")]
+    pub(crate) cloud: Option<PathBuf>,
     /// What the plan may not leave out, separated by commas
     #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
     keep: Vec<KeepItem>,
@@ -193,6 +196,10 @@ pub(crate) struct EvalArgs {
     pub(crate) frame: FrameArgs,
     #[command(flatten)]
     pub(crate) depth: DepthArgs,
+    /// Show the method only N points of the cloud, of those that the input cameras see; a cloud that is not found
+    /// here is looked up in each scene's folder
+    #[arg(long, value_name = "N", requires = "cloud", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) cloud_points: Option<u32>,
     /// Time the reconstruction R times and report the median
     #[arg(long, value_name = "R", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub(crate) repeat: u32,

@@ -2,7 +2,7 @@
 
 use crate::args::DemoArgs;
 use crate::contact::{self, Tile};
-use crate::eval::measure::{self, Measured};
+use crate::eval::measure::{self, Measured, Shown};
 use crate::eval::split;
 use crate::job::{Failure, Outcome, Result};
 use crate::{files, reconstruct, render, sample, scene, shown};
@@ -48,7 +48,8 @@ pub(crate) fn run(args: &DemoArgs) -> Result {
     contact::write(&folder.join("contact.png"), &rows)?;
 
     let given = Options { prior: PriorChoice::Given, ..hull.clone() };
-    let bound = measure::split(&scene_folder, &split, &without_depth, &given, 1)?;
+    let shown = Shown { scene: &scene_folder, options: &without_depth, cloud: None, cloud_points: None };
+    let bound = measure::split(&shown, &split, &given, 1)?;
     Ok(Outcome::done(text(folder, &split, &measured, &bound)))
 }
 

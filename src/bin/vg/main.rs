@@ -5,6 +5,7 @@
 
 mod align;
 mod args;
+mod cloud;
 mod contact;
 mod demo;
 mod eval;

@@ -3,7 +3,7 @@
 use crate::args::{Prior, ReconstructArgs};
 use crate::job::{Outcome, Result};
 use crate::shown::Bar;
-use crate::{files, scene, shown};
+use crate::{cloud, files, scene, shown};
 use vg::io::ply;
 use vg::pipeline::{self, Options, Reconstruction};
 use vg::{Scene, io};
@@ -19,10 +19,12 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
     let load_depth = args.method.prior != Prior::Hull;
     let options = scene::options(&args.frame, args.depth.depth_scale, load_depth)?;
     let index = io::list_scene(&args.scene, &scene::named(args.views.views.as_deref(), &options))?;
-    files::refuse_clashes(&outputs, &scene::files_of(&index))?;
+    let read: Vec<_> = scene::files_of(&index).into_iter().chain(args.method.cloud.clone()).collect();
+    files::refuse_clashes(&outputs, &read)?;
     outputs.iter().try_for_each(|path| files::prepare(path))?;
 
-    let opened = scene::load(index)?;
+    let mut opened = scene::load(index)?;
+    opened.scene.cloud = args.method.cloud.as_deref().map(cloud::read).transpose()?;
     let settings = Options { points: args.points.is_some(), check: !args.no_check, ..args.method.options() };
     let made = reconstruct(&opened.scene, &settings)?;
 

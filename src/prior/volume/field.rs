@@ -7,6 +7,7 @@ use rayon::prelude::*;
 const CLAMP_M: f32 = 1.0;
 
 /// How far inside the hull each grid point is, metres, negative outside.
+#[derive(Clone)]
 pub(crate) struct Field {
     low: Vec3,
     voxel: f32,
@@ -65,6 +66,35 @@ impl Field {
                 }
             });
         }
+    }
+
+    /// Replaces every value by `new(point, value)`, a function that is even in y: it is asked for one half, at
+    /// y >= 0, so that what was its own mirror image remains so to the bit.
+    pub(crate) fn adjust(&mut self, new: impl Fn(Vec3, f32) -> f32 + Sync) {
+        let ([nx, ny, _], low, voxel) = (self.size, self.low, self.voxel);
+        self.values.par_chunks_mut(nx * ny).enumerate().for_each(|(k, slab)| {
+            for j in 0..ny.div_ceil(2) {
+                for i in 0..nx {
+                    let p = low + voxel * Vec3::new(i as f32, j as f32, k as f32);
+                    let p = Vec3::new(p.x, p.y.abs(), p.z);
+                    let (a, b) = (j * nx + i, (ny - 1 - j) * nx + i);
+                    let both = (new(p, slab[a]), new(p, slab[b]));
+                    (slab[a], slab[b]) = both;
+                }
+            }
+        });
+    }
+
+    /// x fastest. `[nz][ny][nx]`
+    #[cfg(test)]
+    pub(crate) fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    /// Points along x, y, z.
+    #[cfg(test)]
+    pub(crate) fn size(&self) -> [usize; 3] {
+        self.size
     }
 
     /// Grid spacing, metres.

@@ -2,13 +2,31 @@
 
 use super::field::Field;
 use crate::error::Result;
+use crate::geometry::Intrinsics;
 use crate::scene::mask::Label;
 use crate::scene::{DepthMap, View};
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 
 /// Confidence of a pixel whose ray passes the hull by and was given the hull's nearest point.
 const GRAZING_CONFIDENCE: f32 = 0.5;
+
+/// Where a ray meets the surface of a field; z is planar depth, metres.
+pub(super) enum Meeting {
+    /// It enters the inside here.
+    Surface(f32),
+    /// It passes by: where it comes closest.
+    Closest { z: f32 },
+    /// It misses the grid altogether.
+    Nowhere,
+}
+
+/// The rays of a pinhole view's pixels, vehicle frame.
+pub(super) struct Rays {
+    origin: Vec3,
+    rotation: Mat3,
+    intrinsics: Intrinsics,
+}
 
 /// Planar depth of every vehicle pixel of `view`. A ray that misses the hull (poses or masks a little off)
 /// takes the depth where it comes closest, so that every vehicle pixel is filled, with lower confidence.
@@ -16,33 +34,59 @@ pub(crate) fn march(view: &View, field: &Field) -> Result<DepthMap> {
     let camera = &view.camera;
     let mask = view.mask.as_ref().expect("hull views have masks");
     let width = camera.width as usize;
-    let origin = camera.center().as_vec3();
-    let rotation = camera.vehicle_from_camera.rotation.as_mat3();
+    let rays = Rays::of(view);
     let mut pixels = vec![(0.0f32, 0.0f32); width * camera.height as usize];
     pixels.par_chunks_mut(width).enumerate().for_each(|(v, row)| {
         for (u, pixel) in row.iter_mut().enumerate() {
             if mask.labels()[v * width + u] != Label::Vehicle {
                 continue;
             }
-            let [x, y] = camera.intrinsics.normalized_from_pixel([u as f64 + 0.5, v as f64 + 0.5]);
-            let direction = rotation * Vec3::new(x as f32, y as f32, 1.0);
-            *pixel = first_inside(field, origin, direction).unwrap_or((0.0, 0.0));
+            *pixel = match rays.meet(field, u, v) {
+                Meeting::Surface(z) => (z, 1.0),
+                Meeting::Closest { z } => (z, GRAZING_CONFIDENCE),
+                Meeting::Nowhere => (0.0, 0.0),
+            };
         }
     });
     let (depth, confidence) = pixels.into_iter().unzip();
     DepthMap::new(camera.width, camera.height, depth)?.with_confidence(confidence)
 }
 
-/// z with `origin + z direction` on the hull's surface, and its confidence; `None` for a ray that misses the
-/// grid altogether. `direction` has z = 1 in the camera frame, so z is planar depth.
-fn first_inside(field: &Field, origin: Vec3, direction: Vec3) -> Option<(f32, f32)> {
+impl Rays {
+    pub(super) fn of(view: &View) -> Self {
+        Self {
+            origin: view.camera.center().as_vec3(),
+            rotation: view.camera.vehicle_from_camera.rotation.as_mat3(),
+            intrinsics: view.camera.intrinsics,
+        }
+    }
+
+    /// The point at planar depth z behind the centre of pixel (u, v).
+    pub(super) fn point(&self, u: usize, v: usize, z: f32) -> Vec3 {
+        self.origin + z * self.direction(u, v)
+    }
+
+    /// The first point of a pixel's ray inside the field.
+    pub(super) fn meet(&self, field: &Field, u: usize, v: usize) -> Meeting {
+        meet(field, self.origin, self.direction(u, v))
+    }
+
+    /// With z = 1 in the camera frame.
+    fn direction(&self, u: usize, v: usize) -> Vec3 {
+        let [x, y] = self.intrinsics.normalized_from_pixel([u as f64 + 0.5, v as f64 + 0.5]);
+        self.rotation * Vec3::new(x as f32, y as f32, 1.0)
+    }
+}
+
+/// `direction` has z = 1 in the camera frame, so that z along it is planar depth.
+fn meet(field: &Field, origin: Vec3, direction: Vec3) -> Meeting {
     let (low, high) = field.bounds();
     let (t0, t1) = ((low - origin) / direction, (high - origin) / direction);
     let enter = t0.min(t1).max_element().max(0.0);
     let leave = t0.max(t1).min_element();
     // A ray in a face of the grid gives NaN; it touches nothing.
     if enter.is_nan() || leave.is_nan() || enter >= leave {
-        return None;
+        return Meeting::Nowhere;
     }
     let metres_per_z = direction.length();
     let shortest = 0.5 * field.voxel() / metres_per_z;
@@ -52,7 +96,7 @@ fn first_inside(field: &Field, origin: Vec3, direction: Vec3) -> Option<(f32, f3
     while z <= leave {
         let f = value(z);
         if f >= 0.0 {
-            return Some((refine(value, before, z), 1.0));
+            return Meeting::Surface(refine(value, before, z));
         }
         if f > closest.1 {
             closest = (z, f);
@@ -61,7 +105,7 @@ fn first_inside(field: &Field, origin: Vec3, direction: Vec3) -> Option<(f32, f3
         // The field falls off no faster than distance, up to the slant of a pixel off the optical axis.
         z += (-0.7 * f / metres_per_z).max(shortest);
     }
-    Some((closest.0, GRAZING_CONFIDENCE))
+    Meeting::Closest { z: closest.0 }
 }
 
 /// Where the value crosses zero between `outside` and `inside`, by bisection to 1/64 of the step.

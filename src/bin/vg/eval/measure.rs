@@ -4,6 +4,7 @@
 //! full frames are compared. A distorted camera's photograph stays on its own grid; the renderer follows it there.
 
 use super::split::Split;
+use super::sweep::sweep;
 use crate::job::Result;
 use crate::{reconstruct, scene};
 use serde::Serialize;
@@ -14,6 +15,7 @@ use vg::metrics::ViewErrors;
 use vg::pipeline::{Options, PriorChoice, Reconstruction};
 use vg::progress::Threads;
 use vg::render::{CpuRenderer, RenderOptions, Rendered, Renderer};
+use vg::scene::Cloud;
 use vg::{Error, Gaussians, View};
 
 /// The numbers of one split.
@@ -26,6 +28,8 @@ pub(crate) struct Measured {
     pub(crate) errors: ViewErrors,
     /// Depth error in the input views, metres, where they have depth that the method was not shown.
     pub(crate) input_depth_mae_m: Option<f64>,
+    /// The 90th percentile there, metres, mean over the views.
+    pub(crate) input_depth_p90_m: Option<f64>,
     /// Median over the repeats, milliseconds.
     pub(crate) reconstruct_ms: f64,
     /// Median over the test views, milliseconds.
@@ -46,15 +50,22 @@ pub(crate) struct MeasuredView {
     pub(crate) errors: ViewErrors,
 }
 
+/// What there is to show to the method.
+pub(crate) struct Shown<'a> {
+    /// File or folder of the scene.
+    pub(crate) scene: &'a Path,
+    /// How it is opened.
+    pub(crate) options: &'a SceneOptions,
+    /// Points measured on the vehicle, all round it.
+    pub(crate) cloud: Option<&'a Cloud>,
+    /// How many of them are shown, of those that the input cameras see; all of the cloud without.
+    pub(crate) cloud_points: Option<usize>,
+}
+
 /// Reconstructs `repeat` times and measures once.
-pub(crate) fn split(
-    path: &Path,
-    split: &Split,
-    options: &SceneOptions,
-    method: &Options,
-    repeat: u32,
-) -> Result<Measured> {
-    let shown = inputs(path, split, options, method)?;
+pub(crate) fn split(from: &Shown, split: &Split, method: &Options, repeat: u32) -> Result<Measured> {
+    let (path, options) = (from.scene, from.options);
+    let shown = inputs(from, split, method)?;
     let made = reconstruct::reconstruct(&shown, method)?;
     let mut times = vec![made.report.total_ms];
     for _ in 1..repeat {
@@ -72,15 +83,21 @@ pub(crate) fn split(
         let drawn = drawn(&made.gaussians, &judged.scene.views, method.threads)?.0;
         let errors: Vec<_> =
             drawn.iter().zip(&judged.scene.views).map(|(d, v)| ViewErrors::of(d, v)).collect();
-        measured.input_depth_mae_m = ViewErrors::mean(&errors).and_then(|mean| mean.depth_mae_m);
+        let mean = ViewErrors::mean(&errors);
+        measured.input_depth_mae_m = mean.and_then(|mean| mean.depth_mae_m);
+        measured.input_depth_p90_m = mean.and_then(|mean| mean.depth_p90_m);
     }
     Ok(measured)
 }
 
 /// The views the method sees, with depth only where it is to use it.
-fn inputs(path: &Path, split: &Split, options: &SceneOptions, method: &Options) -> Result<vg::Scene> {
-    let load_depth = method.prior != PriorChoice::Hull;
-    let mut shown = scene::open(path, &split.input, &SceneOptions { load_depth, ..options.clone() })?.scene;
+fn inputs(from: &Shown, split: &Split, method: &Options) -> Result<vg::Scene> {
+    let options = SceneOptions { load_depth: method.prior != PriorChoice::Hull, ..from.options.clone() };
+    let mut shown = scene::open(from.scene, &split.input, &options)?.scene;
+    shown.cloud = match (from.cloud, from.cloud_points) {
+        (Some(cloud), Some(count)) => Some(Cloud::new(sweep(cloud.points(), &shown.views, count))?),
+        (cloud, _) => cloud.cloned(),
+    };
     if method.prior == PriorChoice::Auto && shown.views.iter().any(|v| v.depth.is_none()) {
         shown.views.iter_mut().for_each(|view| view.depth = None);
     }
@@ -100,6 +117,7 @@ pub(crate) fn judge(
         prior: made.report.prior.to_owned(),
         errors: ViewErrors::mean(&each).ok_or_else(none)?,
         input_depth_mae_m: None,
+        input_depth_p90_m: None,
         reconstruct_ms: made.report.total_ms,
         render_ms,
         gaussians: made.gaussians.len() as f64,
@@ -153,6 +171,7 @@ pub(crate) fn mean(all: &[&Measured]) -> Option<Measured> {
         prior: if same_prior { all[0].prior.clone() } else { "mixed".into() },
         errors,
         input_depth_mae_m: mean(all.iter().filter_map(|m| m.input_depth_mae_m).collect()),
+        input_depth_p90_m: mean(all.iter().filter_map(|m| m.input_depth_p90_m).collect()),
         reconstruct_ms: of(|m| m.reconstruct_ms)?,
         render_ms: of(|m| m.render_ms)?,
         gaussians: of(|m| m.gaussians)?.round(),

@@ -2,12 +2,13 @@
 
 pub(crate) mod measure;
 pub(crate) mod split;
+mod sweep;
 mod table;
 
 use crate::args::EvalArgs;
 use crate::job::{self, Outcome, Result};
-use crate::{files, scene};
-use measure::Measured;
+use crate::{cloud, files, scene};
+use measure::{Measured, Shown};
 use serde::Serialize;
 use std::path::Path;
 use table::Table;
@@ -88,8 +89,11 @@ pub(crate) fn run(args: &EvalArgs) -> Result {
 fn one(path: &Path, args: &EvalArgs, settings: &Options, mut done: impl FnMut(&str, Measured)) -> Result<()> {
     let splits = split::read(&split::find(&args.split, path), args.only.as_deref())?;
     let options = scene::options(&args.frame, args.depth.depth_scale, false)?;
+    let cloud = args.method.cloud.as_ref().map(|file| cloud::read(&split::find(file, path))).transpose()?;
+    let cloud_points = args.cloud_points.map(|n| n as usize);
     for (key, split) in &splits {
-        done(key, measure::split(path, split, &options, settings, args.repeat)?);
+        let shown = Shown { scene: path, options: &options, cloud: cloud.as_ref(), cloud_points };
+        done(key, measure::split(&shown, split, settings, args.repeat)?);
     }
     Ok(())
 }

@@ -14,7 +14,7 @@ pub(crate) struct Split {
     pub(crate) test: Vec<String>,
 }
 
-/// Where the split is: at `path` as it stands, else in the scene's folder.
+/// Where a file that goes with a scene is: at `path` as it stands, else in the scene's folder.
 pub(crate) fn find(path: &Path, scene: &Path) -> PathBuf {
     let folder = if scene.is_dir() { scene } else { scene.parent().unwrap_or(Path::new("")) };
     let beside = folder.join(path);

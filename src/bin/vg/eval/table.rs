@@ -3,7 +3,7 @@
 use super::measure::Measured;
 
 /// Heading of each column.
-const HEADINGS: [&str; 11] = [
+const HEADINGS: [&str; 13] = [
     "scene",
     "split",
     "prior",
@@ -12,6 +12,8 @@ const HEADINGS: [&str; 11] = [
     "PSNR box",
     "IoU",
     "depth MAE m",
+    "in. depth MAE m",
+    "p90",
     "reconstruct s",
     "render ms",
     "Gaussians",
@@ -19,6 +21,12 @@ const HEADINGS: [&str; 11] = [
 
 /// Columns of words are aligned left, columns of numbers right.
 const WORDS: usize = 3;
+
+/// Columns that are shown only where one of the rows has a number for them.
+const OPTIONAL: std::ops::Range<usize> = 8..10;
+
+/// What stands for no number.
+const NONE: &str = "-";
 
 /// Rows of cells below the headings.
 pub(crate) struct Table(Vec<[String; HEADINGS.len()]>);
@@ -31,12 +39,8 @@ impl Table {
 
     /// One split, or the mean.
     pub(crate) fn push(&mut self, scene: &str, split: &str, m: &Measured) {
-        let number =
-            |value: Option<f64>, digits: usize| value.map_or_else(|| "-".into(), |v| format!("{v:.digits$}"));
-        // The test views' depth if they have any, else the inputs'.
-        let depth = match (m.errors.depth_mae_m, m.input_depth_mae_m) {
-            (None, Some(input)) => format!("{input:.4} (in)"),
-            (test, _) => number(test, 4),
+        let number = |value: Option<f64>, digits: usize| {
+            value.map_or_else(|| NONE.into(), |v| format!("{v:.digits$}"))
         };
         self.0.push([
             scene.into(),
@@ -46,7 +50,9 @@ impl Table {
             number(m.errors.ssim, 4),
             number(m.errors.psnr_box_db, 3),
             number(Some(m.errors.silhouette_iou), 4),
-            depth,
+            number(m.errors.depth_mae_m, 4),
+            number(m.input_depth_mae_m, 4),
+            number(m.input_depth_p90_m, 4),
             number(Some(m.reconstruct_ms / 1e3), 3),
             number(Some(m.render_ms), 2),
             format!("{:.0}", m.gaussians),
@@ -55,10 +61,14 @@ impl Table {
 
     /// Lines without trailing spaces.
     pub(crate) fn text(&self) -> String {
+        let is_shown =
+            |column: &usize| !OPTIONAL.contains(column) || self.0[1..].iter().any(|row| row[*column] != NONE);
         let width = |column: usize| self.0.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
-        let widths: [usize; HEADINGS.len()] = std::array::from_fn(width);
+        let columns: Vec<(usize, usize)> =
+            (0..HEADINGS.len()).filter(is_shown).map(|column| (column, width(column))).collect();
         let line = |row: &[String; HEADINGS.len()]| {
-            let cells = row.iter().zip(widths).enumerate().map(|(column, (cell, width))| {
+            let cells = columns.iter().map(|&(column, width)| {
+                let cell = &row[column];
                 if column < WORDS { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
             });
             cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()

@@ -1,0 +1,185 @@
+//! Inflates a field just where silhouettes demand it, until the vehicle's pixels meet its surface.
+//!
+//! A surface that is smoothed, or predicted, ends inside the silhouettes here and there. Where the ray of a
+//! vehicle pixel passes it by, the field is pulled up at the point where the ray comes closest, smoothly, with
+//! its surroundings: single pixels that take the depth of the nearest surface instead hang in the air when they
+//! are seen from elsewhere.
+
+use super::field::Field;
+use super::march::{Meeting, Rays};
+use super::relax::{Ceiling, Pull, Relaxation, Wish, relax};
+use crate::scene::View;
+use crate::scene::mask::{Label, Mask};
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// Rays that were missed once more after a bend: the membrane gives way between the pulls.
+const ROUNDS: usize = 2;
+
+/// How far inside the missed pixels should be, metres: anything more spills over the silhouette.
+const INSIDE_M: f32 = 0.0;
+
+/// A ray that passes by farther than this says that its mask is wrong, metres.
+const WRONG_M: f32 = 0.25;
+
+/// How far the hull is allowed to be too small itself, metres: masks and poses are a pixel off.
+const SLACK_M: f32 = 0.0;
+
+/// Pixels this near to the silhouette's edge are looked at closely.
+const EDGE_PX: usize = 8;
+
+/// Every so many columns and rows near the edge.
+const EDGE_STEP: usize = 2;
+
+/// Every so many columns and rows elsewhere.
+const INNER_STEP: usize = 6;
+
+/// Narrow: the pulls sit side by side along the silhouette's edge, and are not to move what is seen elsewhere.
+const RELAXATION: Relaxation =
+    Relaxation { coarsest: 0.04, finest: 0.04, pulls_per_cell: 0.0, scale: 0.1, stiffness: 0.1, fade: 0.02 };
+
+/// How much of the masks the surface leaves uncovered, as a part of the vehicle's pixels, 0 to 1; estimated from
+/// every second or sixth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Filled {
+    /// By the field as it was.
+    pub uncovered_before: f64,
+    /// After it was bent.
+    pub uncovered_after: f64,
+}
+
+/// Raises `field` until the vehicle pixels of `views` meet its surface, but not above what the `hull`, where
+/// there is one, and a little slack allow. All views have masks.
+pub(crate) fn fill_masks(field: &mut Field, hull: Option<&Field>, views: &[View]) -> Filled {
+    let rays: Vec<Rays> = views.iter().map(Rays::of).collect();
+    let samples: Vec<Sample> = views
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(|(i, view)| samples(i, view.mask.as_ref().expect("hull views have masks")))
+        .collect();
+    let all: f64 = samples.iter().map(|s| s.pixels).sum();
+    let part = |missed: &[(Sample, Pull)]| missed.iter().map(|(s, _)| s.pixels).sum::<f64>() / all.max(1.0);
+    let mut missed = passing(field, &rays, &samples);
+    let uncovered_before = part(&missed);
+    let ceiling = hull.map(|hull| Ceiling { hull, slack: SLACK_M });
+    for _ in 0..ROUNDS {
+        if missed.is_empty() {
+            break;
+        }
+        let pulls: Vec<Pull> =
+            missed.iter().map(|(_, pull)| *pull).filter(|p| field.sample(p.point) > -WRONG_M).collect();
+        relax(field, ceiling, &pulls, &RELAXATION);
+        // The field only rises: what was covered stays so.
+        let again: Vec<Sample> = missed.iter().map(|(sample, _)| *sample).collect();
+        missed = passing(field, &rays, &again);
+    }
+    Filled { uncovered_before, uncovered_after: part(&missed) }
+}
+
+/// A pixel that stands for some.
+#[derive(Clone, Copy)]
+struct Sample {
+    view: usize,
+    u: usize,
+    v: usize,
+    pixels: f64,
+}
+
+/// Pixels of the vehicle, more of them near its edge.
+fn samples(view: usize, mask: &Mask) -> Vec<Sample> {
+    let (width, height) = (mask.width() as usize, mask.height() as usize);
+    let vehicle = |u: usize, v: usize| mask.labels()[v * width + u] == Label::Vehicle;
+    // Beyond the picture's border nothing is known, and nothing ends there.
+    let near_edge = |u: usize, v: usize| {
+        let (left, top) = (u.saturating_sub(EDGE_PX), v.saturating_sub(EDGE_PX));
+        let (right, bottom) = ((u + EDGE_PX).min(width - 1), (v + EDGE_PX).min(height - 1));
+        !(vehicle(left, v) && vehicle(right, v) && vehicle(u, top) && vehicle(u, bottom))
+    };
+    let mut out = Vec::new();
+    for v in (0..height).step_by(EDGE_STEP) {
+        for u in (0..width).step_by(EDGE_STEP).filter(|&u| vehicle(u, v)) {
+            if near_edge(u, v) {
+                out.push(Sample { view, u, v, pixels: (EDGE_STEP * EDGE_STEP) as f64 });
+            } else if u.is_multiple_of(INNER_STEP) && v.is_multiple_of(INNER_STEP) {
+                out.push(Sample { view, u, v, pixels: (INNER_STEP * INNER_STEP) as f64 });
+            }
+        }
+    }
+    out
+}
+
+/// The samples whose rays pass the surface by, and what they ask for.
+fn passing(field: &Field, rays: &[Rays], samples: &[Sample]) -> Vec<(Sample, Pull)> {
+    let verdict = |sample: &Sample| {
+        let &Sample { view, u, v, .. } = sample;
+        match rays[view].meet(field, u, v) {
+            Meeting::Closest { z } => {
+                let point = rays[view].point(u, v, z);
+                Some((*sample, Pull { point, target: INSIDE_M, wish: Wish::AtLeast, weight: 1.0 }))
+            }
+            // Outside the grid nothing can be raised.
+            Meeting::Surface(_) | Meeting::Nowhere => None,
+        }
+    };
+    samples.par_iter().filter_map(verdict).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Camera, Intrinsics, Pose};
+    use crate::scene::RgbImage;
+    use glam::{DMat3, DVec3, Vec3};
+
+    /// How far inside a ball around the origin, metres.
+    fn ball(radius: f32) -> Field {
+        Field::carve(DVec3::splat(-1.2), DVec3::splat(1.2), 0.03, |p| radius - p.length())
+    }
+
+    /// The silhouette of a ball of this radius, from the right.
+    fn view(radius: f64) -> View {
+        let i = Intrinsics { fx: 120.0, fy: 120.0, cx: 50.0, cy: 50.0 };
+        let rotation = DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y);
+        let pose = Pose::new("camera", rotation, DVec3::new(0.0, -4.0, 0.0)).unwrap();
+        let camera = Camera::pinhole(100, 100, i, pose).unwrap();
+        let label = |k: u32| {
+            let ray = camera.ray([f64::from(k % 100) + 0.5, f64::from(k / 100) + 0.5]).unwrap();
+            let passes_at = (4.0 * 4.0 * (1.0 - ray.normalize().z.powi(2))).sqrt();
+            if passes_at < radius { Label::Vehicle } else { Label::Background }
+        };
+        let mask = Mask::new(100, 100, (0..10_000).map(label).collect()).unwrap();
+        let image = RgbImage::new(100, 100, vec![[0; 3]; 10_000]).unwrap();
+        View { name: String::new(), camera, image, mask: Some(mask), depth: None }
+    }
+
+    #[test]
+    fn a_ball_too_small_grows_to_its_silhouette_and_no_further_than_the_hull() {
+        let views = [view(0.8)];
+        let (mut field, hull) = (ball(0.74), ball(0.82));
+        let filled = fill_masks(&mut field, Some(&hull), &views);
+        assert!(filled.uncovered_before > 0.1, "{filled:?}");
+        assert!(filled.uncovered_after < 0.01, "{filled:?}");
+        let rim = field.sample(Vec3::new(0.78, 0.0, 0.0));
+        assert!(rim > -0.005, "{rim}");
+        // What the view sees in the middle of the mask stays where it was.
+        let front = field.sample(Vec3::new(0.0, -0.74, 0.0));
+        assert!(front.abs() < 1e-3, "{front}");
+        assert!(field.values().iter().zip(hull.values()).all(|(f, h)| f <= h));
+    }
+
+    #[test]
+    fn a_hull_that_does_not_fill_the_mask_is_not_left() {
+        let (mut field, hull) = (ball(0.7), ball(0.72));
+        let filled = fill_masks(&mut field, Some(&hull), &[view(0.8)]);
+        assert!(filled.uncovered_after > 0.1 && filled.uncovered_after < filled.uncovered_before);
+        assert!(field.values().iter().zip(hull.values()).all(|(f, h)| f <= h));
+    }
+
+    #[test]
+    fn a_filled_mask_leaves_every_byte() {
+        let mut field = ball(0.85);
+        let filled = fill_masks(&mut field, None, &[view(0.8)]);
+        assert_eq!((filled.uncovered_before, filled.uncovered_after), (0.0, 0.0));
+        assert_eq!(field.values(), ball(0.85).values());
+    }
+}

@@ -1,0 +1,46 @@
+//! Points measured on the vehicle, besides the photographs: a LiDAR sweep, a scan, triangulated features.
+
+use crate::error::{Error, Result};
+use std::sync::Arc;
+
+/// Most points of a cloud.
+pub const MAX_CLOUD_POINTS: usize = 10_000_000;
+
+/// Points in the vehicle frame, metres, in any order, all finite. Some may be wrong or show something else.
+/// Clones share them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cloud(Arc<[[f32; 3]]>);
+
+impl Cloud {
+    /// From at least one point and at most [`MAX_CLOUD_POINTS`].
+    pub fn new(points: Vec<[f32; 3]>) -> Result<Self> {
+        if points.is_empty() || points.len() > MAX_CLOUD_POINTS {
+            let allowed = format!("1 to {MAX_CLOUD_POINTS} points");
+            return Err(Error::argument("cloud", format!("{} points", points.len()), allowed));
+        }
+        if let Some(i) = points.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+            return Err(Error::argument(format!("cloud[{i}]"), format!("{:?}", points[i]), "finite, metres"));
+        }
+        Ok(Self(points.into()))
+    }
+
+    /// Vehicle frame, metres. `[n][3]`
+    pub fn points(&self) -> &[[f32; 3]] {
+        &self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cloud_is_neither_empty_nor_endless_nor_without_number() {
+        let error = |points| Cloud::new(points).unwrap_err().to_string();
+        assert!(error(vec![]).contains("0 points"));
+        assert!(error(vec![[0.0; 3], [0.0, f32::NAN, 0.0]]).contains("cloud[1]"));
+        assert!(error(vec![[f32::INFINITY, 0.0, 0.0]]).contains("finite"));
+        assert!(error(vec![[0.0; 3]; MAX_CLOUD_POINTS + 1]).contains("10000001"));
+        assert_eq!(Cloud::new(vec![[1e30; 3]]).unwrap().points(), [[1e30; 3]]);
+    }
+}
