@@ -23,6 +23,7 @@ pub mod metrics;
 pub mod pipeline;
 pub mod prior;
 pub mod progress;
+pub mod relight;
 pub mod render;
 pub mod scene;
 pub mod symmetry;

@@ -156,6 +156,8 @@ impl vg_options {
             keep: keep(self.keep)?,
             check: read::flag("options.check", self.check)?,
             points: read::flag("options.points", self.points)?,
+            // Not in the C options yet.
+            relight: Default::default(),
             threads: 0,
         })
     }

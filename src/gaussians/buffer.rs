@@ -53,6 +53,11 @@ pub(super) struct MovedArrays<'a> {
 }
 
 impl Gaussians {
+    /// Rotations, and the coefficients of all colours, which must stay finite.
+    pub(crate) fn rotations_and_colors_mut(&mut self) -> (&[[f32; 4]], &mut [f32]) {
+        (&self.rotations, &mut self.sh)
+    }
+
     /// None yet, with room for `capacity`, colour of SH degree `sh_degree` (0 to 3).
     pub fn with_capacity(sh_degree: u8, capacity: usize) -> Self {
         assert!(sh_degree <= sh::MAX_DEGREE, "SH degree {sh_degree} is above {}", sh::MAX_DEGREE);

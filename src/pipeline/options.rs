@@ -1,6 +1,7 @@
 //! What a caller may choose; `Options::default()` is what everything is measured with.
 
 use crate::error::{Error, Result};
+use crate::relight::Relight;
 use crate::symmetry::SymmetryMode;
 use serde::Serialize;
 
@@ -39,6 +40,8 @@ pub struct Options {
     pub prior: PriorChoice,
     /// When Gaussians are cloned across y = 0.
     pub symmetry: SymmetryMode,
+    /// Whether clones are shown in the light of their own side.
+    pub relight: Relight,
     /// Length, width, height in metres, where known.
     pub vehicle_size: Option<[f64; 3]>,
     /// Highest SH degree of the colour, 0 to 3.
@@ -58,6 +61,7 @@ impl Default for Options {
         Self {
             prior: PriorChoice::Auto,
             symmetry: SymmetryMode::Auto,
+            relight: Relight::Auto,
             vehicle_size: None,
             sh_degree: 2,
             keep: Keep::default(),

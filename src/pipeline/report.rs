@@ -2,6 +2,8 @@
 
 use super::options::Options;
 use crate::prior::{BoxSource, Filled, PointFit, VehicleBox};
+use crate::prior::{BoxSource, VehicleBox};
+use crate::relight::Relighting;
 use crate::symmetry::Completion;
 use serde::Serialize;
 use std::time::Instant;
@@ -88,6 +90,8 @@ pub struct Report {
     pub left_out: Vec<LeftOut>,
     /// How the unseen side was completed.
     pub symmetry: Completion,
+    /// The light of the unseen side, where it was estimated.
+    pub relight: Option<Relighting>,
     /// Error on the input views, unless the check was switched off.
     pub input_error: Option<InputError>,
     /// The options of the call.

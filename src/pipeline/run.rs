@@ -10,10 +10,11 @@ use crate::head::{GaussianHead, SurfelHead};
 use crate::metrics;
 use crate::prior::{DepthPrior, Geometry, GivenDepth, HullPrior};
 use crate::progress::{Context, ProgressCallback, Threads};
+use crate::relight::{Light, Relight, Relighting};
 use crate::render::{CpuRenderer, RenderOptions, Renderer};
 use crate::scene::visibility::{Observer, SURFACE_M, Sight};
 use crate::scene::{Scene, View, undistort};
-use crate::symmetry::{self, MirroredPlace, SymmetryMode};
+use crate::symmetry::{self, Completion, MirroredPlace, SymmetryMode};
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
@@ -93,8 +94,8 @@ pub fn reconstruct_on<'a>(
     clock.lap("head");
 
     context.report("symmetry", 0.0)?;
-    let (gaussians, completion) =
-        context.parallel(|| complete(gaussians, options.symmetry, &views, &geometry));
+    let (gaussians, completion, relight) =
+        context.parallel(|| complete(gaussians, options, &views, &geometry));
     plan::note(&mut left_out, "clones", "the mirrored place was observed by a view", completion.not_needed);
     clock.lap("symmetry");
 
@@ -122,6 +123,7 @@ pub fn reconstruct_on<'a>(
         masks: geometry.masks,
         left_out,
         symmetry: completion,
+        relight,
         input_error,
         settings: options.clone(),
     };
@@ -159,13 +161,13 @@ fn point_cloud(views: &[View], geometry: &Geometry) -> PointCloud {
 
 /// Cloning; in `Auto` the mirrored place counts as seen where a view looked at it and saw a surface, or saw
 /// through it to another one. The background says nothing here: with poses a pixel off, the rim of every mirror
-/// image lies in it.
+/// image lies in it. Clones are last; they are shown in the light of their own side.
 fn complete(
     gaussians: Gaussians,
-    mode: SymmetryMode,
+    options: &Options,
     views: &[View],
     geometry: &Geometry,
-) -> (Gaussians, symmetry::Completion) {
+) -> (Gaussians, Completion, Option<Relighting>) {
     /// Seen at this many times the resolution is much better.
     const MUCH_BETTER: f32 = 1.5;
     let cameras: Vec<_> = views.iter().map(|v| v.camera).collect();
@@ -186,10 +188,17 @@ fn complete(
         }
         mirrored
     };
-    symmetry::complete(gaussians, mode, &cameras, |gaussians| {
+    let light = match (options.relight, options.symmetry) {
+        (Relight::Never, _) | (_, SymmetryMode::Never) => None,
+        (Relight::Auto, _) => Light::estimate(&gaussians),
+    };
+    let (mut gaussians, done) = symmetry::complete(gaussians, options.symmetry, &cameras, |gaussians| {
         let observers = geometry.observers(views);
         (0..gaussians.len()).into_par_iter().map(|i| verdict(&observers, gaussians, i)).collect()
-    })
+    });
+    let clones = gaussians.len() - done.cloned..gaussians.len();
+    let relighting = light.map(|light| light.apply(&mut gaussians, clones));
+    (gaussians, done, relighting)
 }
 
 /// Centre and normal of the mirror image of a surfel, and the resolution at which the original was seen.

@@ -52,6 +52,7 @@ pub(crate) fn reconstruct<'py>(
         check,
         threads,
         points,
+        ..Options::default()
     };
     // Before the pixels are copied.
     options.validate().map_err(|e| from_library(py, e))?;

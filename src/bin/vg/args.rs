@@ -3,6 +3,7 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use vg::pipeline::{Keep, Options, PriorChoice};
+use vg::relight::Relight;
 use vg::render::Background;
 use vg::symmetry::SymmetryMode;
 
@@ -42,6 +43,10 @@ pub(crate) struct MethodArgs {
     /// Mirror what was not observed (auto), all of the denser side (always), or nothing (never)
     #[arg(long, value_enum, default_value_t = Symmetry::Auto)]
     symmetry: Symmetry,
+    /// Show mirror images in the light of their own side, as far as it can be told from what was seen (auto), or as
+    /// they were seen (never)
+    #[arg(long, value_enum, default_value_t = Relit::Auto)]
+    relight: Relit,
     /// Length, width and height of the vehicle in metres, where known
     #[arg(long = "box", value_name = "L,W,H", value_parser = vehicle_size)]
     vehicle_size: Option<VehicleSize>,
@@ -73,6 +78,10 @@ impl MethodArgs {
                 Symmetry::Auto => SymmetryMode::Auto,
                 Symmetry::Always => SymmetryMode::Always,
                 Symmetry::Never => SymmetryMode::Never,
+            },
+            relight: match self.relight {
+                Relit::Auto => Relight::Auto,
+                Relit::Never => Relight::Never,
             },
             vehicle_size: self.vehicle_size.map(|s| s.0),
             sh_degree: self.sh_degree,
@@ -241,6 +250,12 @@ pub(crate) enum Prior {
 enum Symmetry {
     Auto,
     Always,
+    Never,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Relit {
+    Auto,
     Never,
 }
 
