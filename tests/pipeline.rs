@@ -20,11 +20,11 @@ fn left_out(made: &Reconstruction, why: &str) -> usize {
 }
 
 #[test]
-fn given_depth_is_used_when_every_view_has_it_and_the_hull_otherwise() {
+fn given_depth_is_used_when_every_view_has_it_and_the_shape_prior_otherwise() {
     let mut scene = right_side(160, 120);
     assert_eq!(run(&scene, &Options::default()).report.prior, "given");
     scene.views[3].depth = None;
-    assert_eq!(run(&scene, &Options::default()).report.prior, "hull");
+    assert_eq!(run(&scene, &Options::default()).report.prior, "shape");
     let asked = Options { prior: PriorChoice::Given, ..Options::default() };
     let error = reconstruct(&scene, &asked, &mut |_| ControlFlow::Continue(())).unwrap_err().to_string();
     assert!(error.starts_with("views[3] (-140).depth"), "{error}");

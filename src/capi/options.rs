@@ -155,6 +155,7 @@ impl vg_options {
             sh_degree: sh_degree("options.sh_degree", self.sh_degree)?,
             keep: keep(self.keep)?,
             check: read::flag("options.check", self.check)?,
+            photo: true,
             points: read::flag("options.points", self.points)?,
             // Not in the C options yet.
             relight: Default::default(),

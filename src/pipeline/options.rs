@@ -9,13 +9,15 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PriorChoice {
-    /// `Given` if every used view has depth, else the best prior without: `Hull`.
+    /// `Given` if every used view has depth, else the best prior without: `Shape`.
     #[default]
     Auto,
     /// The caller's metric depth.
     Given,
     /// The visual hull of the silhouettes and their mirrored twins.
     Hull,
+    /// The hull, corrected by what vehicles look like.
+    Shape,
 }
 
 /// What the plan would leave out, kept nevertheless; all `false` by default.
@@ -50,6 +52,8 @@ pub struct Options {
     pub keep: Keep,
     /// Whether to draw the model into its input views and report the error there.
     pub check: bool,
+    /// Whether the `Shape` prior moves its surface to where the photographs agree.
+    pub photo: bool,
     /// Worker threads; 0 means one per core.
     pub threads: usize,
     /// Whether to return the metric coloured point cloud as well.
@@ -66,6 +70,7 @@ impl Default for Options {
             sh_degree: 2,
             keep: Keep::default(),
             check: true,
+            photo: true,
             threads: 0,
             points: false,
         }

@@ -57,7 +57,7 @@ fn same_camera(a: &View, b: &View) -> bool {
 pub(super) fn prior(views: &[View], options: &Options) -> PriorChoice {
     match options.prior {
         PriorChoice::Auto if views.iter().all(|v| v.depth.is_some()) => PriorChoice::Given,
-        PriorChoice::Auto => PriorChoice::Hull,
+        PriorChoice::Auto => PriorChoice::Shape,
         chosen => chosen,
     }
 }

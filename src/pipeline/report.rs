@@ -1,8 +1,7 @@
 //! What a reconstruction did, how long it took, what it left out, and the error it can know.
 
 use super::options::Options;
-use crate::prior::{BoxSource, Filled, PointFit, VehicleBox};
-use crate::prior::{BoxSource, VehicleBox};
+use crate::prior::{BoxSource, Filled, PhotoFit, PointFit, VehicleBox};
 use crate::relight::Relighting;
 use crate::symmetry::Completion;
 use serde::Serialize;
@@ -84,6 +83,8 @@ pub struct Report {
     pub vehicle_box: Option<BoxReport>,
     /// What the prior made of the scene's cloud.
     pub cloud: Option<PointFit>,
+    /// What the photographs said of the prior's surface, where they were asked.
+    pub photo: Option<PhotoFit>,
     /// How the prior closed what its surface left open of the masks.
     pub masks: Option<Filled>,
     /// Work this scene did not need.

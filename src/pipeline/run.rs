@@ -8,7 +8,7 @@ use crate::gaussians::Gaussians;
 use crate::head::surfel::FOOTPRINT_SIGMA_PX;
 use crate::head::{GaussianHead, SurfelHead};
 use crate::metrics;
-use crate::prior::{DepthPrior, Geometry, GivenDepth, HullPrior};
+use crate::prior::{DepthPrior, Geometry, GivenDepth, HullPrior, ShapePrior};
 use crate::progress::{Context, ProgressCallback, Threads};
 use crate::relight::{Light, Relight, Relighting};
 use crate::render::{CpuRenderer, RenderOptions, Renderer};
@@ -120,6 +120,7 @@ pub fn reconstruct_on<'a>(
         views_used: views.iter().map(|v| v.name.clone()).collect(),
         vehicle_box: geometry.vehicle_box.map(Into::into),
         cloud: geometry.points,
+        photo: geometry.photo,
         masks: geometry.masks,
         left_out,
         symmetry: completion,
@@ -137,8 +138,10 @@ fn undistorted(scene: &Scene, used: &[usize], context: &Context) -> Result<Vec<V
 fn chosen_prior(choice: PriorChoice, scene: &Scene, options: &Options) -> Box<dyn DepthPrior> {
     match choice {
         PriorChoice::Given => Box::new(GivenDepth),
-        PriorChoice::Hull | PriorChoice::Auto => {
-            Box::new(HullPrior { size: options.vehicle_size, cloud: scene.cloud.clone() })
+        PriorChoice::Hull => Box::new(HullPrior { size: options.vehicle_size, cloud: scene.cloud.clone() }),
+        PriorChoice::Shape | PriorChoice::Auto => {
+            let (size, cloud) = (options.vehicle_size, scene.cloud.clone());
+            Box::new(ShapePrior { size, cloud, photo: options.photo })
         }
     }
 }

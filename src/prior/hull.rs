@@ -48,15 +48,7 @@ impl DepthPrior for HullPrior {
     }
 
     fn estimate(&self, views: &[View], context: &Context) -> Result<Geometry> {
-        for (i, view) in views.iter().enumerate() {
-            if view.mask.as_ref().is_none_or(|m| m.vehicle_pixels() == 0) {
-                return Err(Error::argument(
-                    format!("{}.mask", view.argument(i)),
-                    if view.mask.is_some() { "no vehicle pixel" } else { "none" },
-                    "a mask with the vehicle: the hull prior knows nothing but silhouettes",
-                ));
-            }
-        }
+        self.require_masks(views)?;
         let silhouettes: Vec<Silhouette> =
             context.parallel(|| views.par_iter().map(Silhouette::new).collect());
         context.report("prior", 0.15)?;
@@ -83,16 +75,37 @@ impl DepthPrior for HullPrior {
 }
 
 impl HullPrior {
-    fn find_box(&self, views: &[View], silhouettes: &[Silhouette]) -> Result<VehicleBox> {
+    /// An error for a view without silhouette.
+    pub(super) fn require_masks(&self, views: &[View]) -> Result<()> {
+        for (i, view) in views.iter().enumerate() {
+            if view.mask.as_ref().is_none_or(|m| m.vehicle_pixels() == 0) {
+                return Err(Error::argument(
+                    format!("{}.mask", view.argument(i)),
+                    if view.mask.is_some() { "no vehicle pixel" } else { "none" },
+                    "a mask with the vehicle: without depth there is nothing but silhouettes",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// The vehicle's box, of the size that the caller gave, if so.
+    pub(super) fn find_box(&self, views: &[View], silhouettes: &[Silhouette]) -> Result<VehicleBox> {
         let estimated = estimate_box(views, |p| inside_all(silhouettes, p))?;
         Ok(self.size.map_or(estimated, |size| place_box(size, &estimated)))
     }
 }
 
+/// Grid spacing for a vehicle of this size, metres.
+pub(super) fn voxel(vehicle_box: &VehicleBox) -> f64 {
+    let longest = vehicle_box.size().into_iter().fold(0.0, f64::max);
+    (longest / MOST_POINTS).max(FINEST_VOXEL_M)
+}
+
 /// The hull in its box, with a margin so that the surface lies inside the grid.
 fn carve(silhouettes: &[Silhouette], vehicle_box: &VehicleBox) -> Field {
     let (low, high) = (glam::DVec3::from_array(vehicle_box.low), glam::DVec3::from_array(vehicle_box.high));
-    let voxel = ((high - low).max_element() / MOST_POINTS).max(FINEST_VOXEL_M);
+    let voxel = voxel(vehicle_box);
     let margin = glam::DVec3::splat(2.0 * voxel);
     Field::carve(low - margin, high + margin, voxel, |p| {
         inside_all(silhouettes, p).min(inside_box(vehicle_box, p))

@@ -3,10 +3,15 @@
 pub mod given;
 pub mod hull;
 pub mod normals;
-pub(crate) mod volume;
+mod photo;
+pub mod shape;
+#[doc(hidden)] // For the training of the shape prior.
+pub mod volume;
 
 pub use given::GivenDepth;
 pub use hull::HullPrior;
+pub use photo::PhotoFit;
+pub use shape::ShapePrior;
 pub use volume::{Filled, PointFit};
 
 use crate::error::Result;
@@ -36,6 +41,8 @@ pub struct Geometry {
     pub vehicle_box: Option<VehicleBox>,
     /// What it made of the scene's cloud, where there is one and it has a use for it.
     pub points: Option<PointFit>,
+    /// What the photographs said of the surface, where they were asked.
+    pub photo: Option<PhotoFit>,
     /// How it closed what its surface left open of the masks, where it does.
     pub masks: Option<Filled>,
 }
@@ -43,7 +50,7 @@ pub struct Geometry {
 impl Geometry {
     /// Depth without normals yet.
     pub fn new(depths: Vec<DepthMap>, vehicle_box: Option<VehicleBox>) -> Self {
-        Self { depths, normals: Vec::new(), vehicle_box, points: None, masks: None }
+        Self { depths, normals: Vec::new(), vehicle_box, points: None, photo: None, masks: None }
     }
 
     /// About the middle of what the views see, vehicle frame, metres: the mean of some lifted pixels.

@@ -8,14 +8,14 @@ fn the_demo_leaves_model_report_renders_and_contact_sheet() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path().join("new");
     let out = succeed(&at, "demo {}").out;
-    for word in ["PSNR", "--prior hull", "--prior given", "contact.png", "asset.ply"] {
+    for word in ["PSNR", "--prior shape", "--prior given", "contact.png", "asset.ply"] {
         assert!(out.contains(word), "{word} in {out}");
     }
     for file in ["asset.ply", "points.ply", "report.json", "contact.png"] {
         assert!(fs::metadata(at.join(file)).unwrap().len() > 1000, "{file}");
     }
     assert_eq!(fs::read_dir(at.join("unseen")).unwrap().count(), 4);
-    assert_eq!(json(&at.join("report.json"))["prior"], "hull");
+    assert_eq!(json(&at.join("report.json"))["prior"], "shape");
     assert!(fs::read(at.join("asset.ply")).unwrap() == fs::read(asset()).unwrap());
     let sheet = image::open(at.join("contact.png")).unwrap();
     assert!(sheet.width() > 1000 && sheet.height() > 300);

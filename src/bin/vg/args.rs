@@ -37,7 +37,8 @@ pub(crate) enum Command {
 /// How a reconstruction is made; shared by `reconstruct` and `eval`.
 #[derive(Args)]
 pub(crate) struct MethodArgs {
-    /// Depth source: the scene's own depth, the visual hull, or (auto) the first if every used view has depth
+    /// Depth source: the scene's own depth; the visual hull; the hull corrected by what vehicles look like; or (auto)
+    /// the first if every used view has depth, else the last
     #[arg(long, value_enum, default_value_t = Prior::Auto)]
     pub(crate) prior: Prior,
     /// Mirror what was not observed (auto), all of the denser side (always), or nothing (never)
@@ -59,6 +60,9 @@ pub(crate) struct MethodArgs {
     /// What the plan may not leave out, separated by commas
     #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
     keep: Vec<KeepItem>,
+    /// Do not move the shape prior's surface to where the photographs agree
+    #[arg(long)]
+    no_photo: bool,
     /// Worker threads; 0 means one per core
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) threads: usize,
@@ -73,6 +77,7 @@ impl MethodArgs {
                 Prior::Auto => PriorChoice::Auto,
                 Prior::Given => PriorChoice::Given,
                 Prior::Hull => PriorChoice::Hull,
+                Prior::Shape => PriorChoice::Shape,
             },
             symmetry: match self.symmetry {
                 Symmetry::Auto => SymmetryMode::Auto,
@@ -93,6 +98,7 @@ impl MethodArgs {
                 sh_bands: kept(KeepItem::ShBands),
             },
             check: true,
+            photo: !self.no_photo,
             threads: self.threads,
             points: false,
         }
@@ -244,6 +250,7 @@ pub(crate) enum Prior {
     Auto,
     Given,
     Hull,
+    Shape,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]

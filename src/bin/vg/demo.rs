@@ -24,10 +24,10 @@ pub(crate) fn run(args: &DemoArgs) -> Result {
     let split = splits.into_values().next().ok_or_else(|| Failure::job("the sample has no split"))?;
     // Photographs, masks and cameras are all this gets; the sample's depth is for the comparison below.
     let without_depth = SceneOptions { load_depth: false, ..SceneOptions::default() };
-    let hull =
-        Options { prior: PriorChoice::Hull, threads: args.threads, points: true, ..Options::default() };
+    let shape =
+        Options { prior: PriorChoice::Shape, threads: args.threads, points: true, ..Options::default() };
     let inputs = scene::open(&scene_folder, &split.input, &without_depth)?;
-    let made = reconstruct::reconstruct(&inputs.scene, &hull)?;
+    let made = reconstruct::reconstruct(&inputs.scene, &shape)?;
 
     let tests = scene::open(&scene_folder, &split.test, &without_depth)?;
     let (drawn, measured) = measure::judge(&made, &tests.scene.views, args.threads)?;
@@ -47,7 +47,7 @@ pub(crate) fn run(args: &DemoArgs) -> Result {
     ];
     contact::write(&folder.join("contact.png"), &rows)?;
 
-    let given = Options { prior: PriorChoice::Given, ..hull.clone() };
+    let given = Options { prior: PriorChoice::Given, ..shape.clone() };
     let shown = Shown { scene: &scene_folder, options: &without_depth, cloud: None, cloud_points: None };
     let bound = measure::split(&shown, &split, &given, 1)?;
     Ok(Outcome::done(text(folder, &split, &measured, &bound)))
@@ -64,7 +64,7 @@ fn rendered(picture: &Rendered) -> Tile {
 }
 
 /// The main figures, and where to look.
-fn text(folder: &Path, split: &split::Split, hull: &Measured, given: &Measured) -> String {
+fn text(folder: &Path, split: &split::Split, shape: &Measured, given: &Measured) -> String {
     let row = |name: &str, m: &Measured| {
         format!(
             "  {name:<30} {:>7.2} {:>6.3} {:>6.3} {:>9.2} {:>10.1} {:>10}",
@@ -95,7 +95,7 @@ fn text(folder: &Path, split: &split::Split, hull: &Measured, given: &Measured) 
             "  {:<30} {:>7} {:>6} {:>6} {:>9} {:>10} {:>10}",
             "depth from", "PSNR dB", "SSIM", "IoU", "time s", "ms/picture", "Gaussians"
         ),
-        row("silhouettes (--prior hull)", hull),
+        row("silhouettes (--prior shape)", shape),
         row("the scene (--prior given)", given),
         "The second row is a bound: it is given the true depth of the inputs. Of the first row there are now,".into(),
         format!("in {}:", folder.display()),

@@ -21,9 +21,12 @@ const NARROWEST_LIMIT_M: f64 = 1.7;
 /// Grid points along the longest axis of the search.
 const SEARCH_POINTS: f64 = 72.0;
 
+/// Farther outside than this nobody asks how far, metres.
+const FAR_OUTSIDE_M: f32 = -1.0;
+
 /// Finds the box by carving coarsely, each time in what was left of the box before: first in a cube around where
 /// the views look.
-pub(crate) fn estimate_box(views: &[View], inside: impl Fn(Vec3) -> f32 + Sync) -> Result<VehicleBox> {
+pub fn estimate_box(views: &[View], inside: impl Fn(Vec3) -> f32 + Sync) -> Result<VehicleBox> {
     let center = meeting_point(views);
     let radius = search_radius(views, center)?;
     let y = radius.min(0.5 * LARGEST_M.y);
@@ -142,7 +145,7 @@ fn search_radius(views: &[View], center: DVec3) -> Result<f64> {
 }
 
 /// The caller's size placed where the silhouettes are: same middle along x, same ground.
-pub(crate) fn place_box(size: [f64; 3], estimated: &VehicleBox) -> VehicleBox {
+pub fn place_box(size: [f64; 3], estimated: &VehicleBox) -> VehicleBox {
     let middle = 0.5 * (estimated.low[0] + estimated.high[0]);
     let ground = estimated.low[2];
     VehicleBox {
@@ -153,14 +156,30 @@ pub(crate) fn place_box(size: [f64; 3], estimated: &VehicleBox) -> VehicleBox {
 }
 
 /// How far inside the box `p` is, metres.
-pub(crate) fn inside_box(vehicle_box: &VehicleBox, p: Vec3) -> f32 {
+pub fn inside_box(vehicle_box: &VehicleBox, p: Vec3) -> f32 {
     let p = p.to_array();
     (0..3)
         .map(|k| (p[k] - vehicle_box.low[k] as f32).min(vehicle_box.high[k] as f32 - p[k]))
         .fold(f32::INFINITY, f32::min)
 }
 
-/// All silhouettes' verdict: how far inside all cones.
-pub(crate) fn inside_all(silhouettes: &[Silhouette], p: Vec3) -> f32 {
-    silhouettes.iter().map(|s| s.inside(p)).fold(f32::INFINITY, f32::min)
+/// All silhouettes' verdict: how far inside all cones; below [`FAR_OUTSIDE_M`] some value below it.
+pub fn inside_all(silhouettes: &[Silhouette], p: Vec3) -> f32 {
+    let mut least = f32::INFINITY;
+    for silhouette in silhouettes {
+        least = least.min(silhouette.inside(p));
+        if least < FAR_OUTSIDE_M {
+            break;
+        }
+    }
+    least
+}
+
+/// The verdict of all silhouettes and of their mirrored twins.
+pub fn inside_both(silhouettes: &[Silhouette], p: Vec3) -> f32 {
+    let here = inside_all(silhouettes, p);
+    if here < FAR_OUTSIDE_M {
+        return here;
+    }
+    here.min(inside_all(silhouettes, Vec3::new(p.x, -p.y, p.z)))
 }

@@ -47,6 +47,36 @@ impl Field {
         Self { low, voxel, size, values }
     }
 
+    /// Evaluates `inside`, which is its own mirror image, at the points of the same grid.
+    pub(crate) fn symmetric(
+        low: DVec3,
+        high: DVec3,
+        voxel: f64,
+        inside: impl Fn(Vec3) -> f32 + Sync,
+    ) -> Self {
+        let mut field = Self::empty(low, high, voxel);
+        let [nx, ny, _] = field.size;
+        let (low, voxel) = (field.low, field.voxel);
+        field.values.par_chunks_mut(nx * ny).enumerate().for_each(|(k, slab)| {
+            for j in 0..ny.div_ceil(2) {
+                for i in 0..nx {
+                    let p = low + voxel * Vec3::new(i as f32, j as f32, k as f32);
+                    slab[j * nx + i] = inside(p).clamp(-CLAMP_M, CLAMP_M);
+                }
+                slab.copy_within(j * nx..(j + 1) * nx, (ny - 1 - j) * nx);
+            }
+        });
+        field
+    }
+
+    /// Zero everywhere, on the grid of [`Field::carve`].
+    fn empty(low: DVec3, high: DVec3, voxel: f64) -> Self {
+        let size: [usize; 3] = std::array::from_fn(|k| ((high[k] - low[k]) / voxel).ceil() as usize + 1);
+        let half_width = 0.5 * (size[1] - 1) as f64 * voxel;
+        let low = Vec3::new(low.x as f32, -half_width as f32, low.z as f32);
+        Self { low, voxel: voxel as f32, size, values: vec![0.0; size.iter().product()] }
+    }
+
     /// Replaces every value by the mean over the cube that reaches `radius` metres (rounded to grid points) to
     /// either side, cut at the border of the grid.
     pub(crate) fn smooth(&mut self, radius: f32) {

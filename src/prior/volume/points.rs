@@ -80,7 +80,8 @@ fn thinned(points: &[Vec3]) -> Vec<Pull> {
     order.chunk_by(|a, b| a.0 == b.0).map(pull).collect()
 }
 
-fn median_distance(field: &Field, pulls: &[Pull]) -> f64 {
+/// Of the pulls' points to the surface, metres, as far as the field can tell.
+pub(crate) fn median_distance(field: &Field, pulls: &[Pull]) -> f64 {
     let mut distances: Vec<f32> = pulls.iter().map(|p| field.sample(p.point).abs()).collect();
     let middle = distances.len() / 2;
     match distances.len() {

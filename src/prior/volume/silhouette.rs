@@ -9,7 +9,7 @@ use glam::{Mat3, Vec3};
 const FAR: f32 = 1e5;
 
 /// One view's silhouette, ready for look-ups.
-pub(crate) struct Silhouette {
+pub struct Silhouette {
     width: usize,
     height: usize,
     /// Signed distance in pixels at pixel centres: positive where the vehicle may be. `[height * width]`
@@ -23,7 +23,7 @@ pub(crate) struct Silhouette {
 
 impl Silhouette {
     /// From a pinhole view with a mask.
-    pub(crate) fn new(view: &View) -> Self {
+    pub fn new(view: &View) -> Self {
         let mask = view.mask.as_ref().expect("hull views have masks");
         let (width, height) = (mask.width() as usize, mask.height() as usize);
         let silent = touches_unknown(mask);
@@ -56,7 +56,7 @@ impl Silhouette {
 
     /// How far `point` (vehicle frame) is inside this view's cone, metres, negative outside; infinite where
     /// the view makes no statement: behind the camera or beyond a border that cuts the silhouette.
-    pub(crate) fn inside(&self, point: Vec3) -> f32 {
+    pub fn inside(&self, point: Vec3) -> f32 {
         // Nearer than this, a point is inside the camera rather than in its picture.
         const NEAR_M: f32 = 0.05;
         let p = self.camera_from_vehicle.0 * point + self.camera_from_vehicle.1;
@@ -122,7 +122,7 @@ fn touches_unknown(mask: &Mask) -> bool {
 }
 
 /// A ray through the centre of the silhouette, vehicle frame: origin and unit direction.
-pub(crate) fn central_ray(camera: &Camera, bounds: [u32; 4]) -> (glam::DVec3, glam::DVec3) {
+pub fn central_ray(camera: &Camera, bounds: [u32; 4]) -> (glam::DVec3, glam::DVec3) {
     let pixel = [0.5 * f64::from(bounds[0] + bounds[2] + 1), 0.5 * f64::from(bounds[1] + bounds[3] + 1)];
     let [x, y] = camera.intrinsics.normalized_from_pixel(pixel);
     let direction = camera.vehicle_from_camera.rotation * glam::DVec3::new(x, y, 1.0).normalize();

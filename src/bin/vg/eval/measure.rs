@@ -92,7 +92,8 @@ pub(crate) fn split(from: &Shown, split: &Split, method: &Options, repeat: u32) 
 
 /// The views the method sees, with depth only where it is to use it.
 fn inputs(from: &Shown, split: &Split, method: &Options) -> Result<vg::Scene> {
-    let options = SceneOptions { load_depth: method.prior != PriorChoice::Hull, ..from.options.clone() };
+    let load_depth = matches!(method.prior, PriorChoice::Auto | PriorChoice::Given);
+    let options = SceneOptions { load_depth, ..from.options.clone() };
     let mut shown = scene::open(from.scene, &split.input, &options)?.scene;
     shown.cloud = match (from.cloud, from.cloud_points) {
         (Some(cloud), Some(count)) => Some(Cloud::new(sweep(cloud.points(), &shown.views, count))?),

@@ -1,0 +1,180 @@
+//! The learned prior: the hull of the silhouettes, corrected by what vehicles look like.
+//!
+//! A few silhouettes at one height carve a hull that is too fat, but how fat is predictable from where on the
+//! vehicle one looks. A small network that was trained on procedural vehicles only ([`network`]) turns the hull on
+//! a coarse lattice over half the vehicle ([`lattice`]) into signed distance to the vehicle's surface, with an
+//! uncertainty. It is one surface for all views and their mirrored twins: nothing has to be fused. Where the network
+//! is unsure the surface stays nearer to the hull, and nowhere it leaves the hull. Then it moves to where the
+//! photographs agree ([`super::photo`]) and to measured points, where there are some, and at last it yields where
+//! masks are not filled.
+
+pub mod lattice;
+mod network;
+
+use super::photo::fit_photographs;
+use super::volume::{Field, Silhouette, fill_masks, fit_points, inside_both, march};
+use super::{DepthPrior, Geometry, HullPrior, VehicleBox};
+use crate::error::Result;
+use crate::progress::Context;
+use crate::scene::{Cloud, DepthMap, View};
+use glam::DVec3;
+use lattice::{HULL_CLAMP_M, Lattice, NODES, VIEW_NUMBERS, hull_on, view_numbers};
+use network::{Network, Planes};
+use rayon::prelude::*;
+
+/// Metres per unit of the network's answer.
+const UNIT_M: f32 = 0.25;
+
+/// Logarithms of the Laplace scale are clamped to these, units of [`UNIT_M`].
+const LOG_SCALE: std::ops::RangeInclusive<f32> = -4.0..=1.0;
+
+/// An expected error that halves a pixel's confidence, metres.
+const HALF_TRUSTED_M: f32 = 0.05;
+
+/// Corrections with smaller expected errors are applied in full, those with larger ones not at all, metres.
+const TRUSTED_M: std::ops::Range<f32> = 0.10..0.30;
+
+/// The hull may be this much too thin, metres: masks and poses are not exact.
+const HULL_SLACK_M: f32 = 0.02;
+
+/// See the module's documentation.
+#[derive(Clone, Debug, Default)]
+pub struct ShapePrior {
+    /// Length, width, height in metres, where the caller knows them.
+    pub size: Option<[f64; 3]>,
+    /// Points measured on the vehicle, where there are some.
+    pub cloud: Option<Cloud>,
+    /// Whether the surface is also moved to where the photographs agree, see [`super::photo`].
+    pub photo: bool,
+}
+
+impl DepthPrior for ShapePrior {
+    fn name(&self) -> &'static str {
+        "shape"
+    }
+
+    fn estimate(&self, views: &[View], context: &Context) -> Result<Geometry> {
+        let hull = HullPrior { size: self.size, cloud: None };
+        hull.require_masks(views)?;
+        let silhouettes: Vec<Silhouette> =
+            context.parallel(|| views.par_iter().map(Silhouette::new).collect());
+        context.report("prior", 0.1)?;
+        let vehicle_box = context.parallel(|| hull.find_box(views, &silhouettes))?;
+        context.report("prior", 0.2)?;
+        let network = Network::embedded()?;
+        let shape = context.parallel(|| Shape::predict(network, &vehicle_box, &silhouettes, views));
+        context.report("prior", 0.35)?;
+        let (mut field, hull) = context.parallel(|| shape.field(&vehicle_box, &silhouettes));
+        context.report("prior", 0.45)?;
+        let photo = match self.photo {
+            true => Some(context.parallel(|| fit_photographs(&mut field, &hull, views))?),
+            false => None,
+        };
+        context.report("prior", 0.7)?;
+        let points = self
+            .cloud
+            .as_ref()
+            .map(|cloud| context.parallel(|| fit_points(&mut field, Some(&hull), cloud.points())));
+        let masks = context.parallel(|| fill_masks(&mut field, Some(&hull), views));
+        context.report("prior", 0.8)?;
+        let mut depths = Vec::with_capacity(views.len());
+        for (i, view) in views.iter().enumerate() {
+            depths.push(context.parallel(|| shape.with_confidence(view, march::march(view, &field)?))?);
+            context.report("prior", 0.8 + 0.2 * (i + 1) as f64 / views.len() as f64)?;
+        }
+        Ok(Geometry { points, photo, masks: Some(masks), ..Geometry::new(depths, Some(vehicle_box)) })
+    }
+}
+
+/// What the network says of half a vehicle.
+struct Shape {
+    lattice: Lattice,
+    /// Signed distance to the surface, positive inside, metres. `[16][32][96]`
+    distance: Vec<f32>,
+    /// Mean absolute error to be expected there, metres. `[16][32][96]`
+    error: Vec<f32>,
+}
+
+impl Shape {
+    fn predict(
+        network: &Network,
+        vehicle_box: &VehicleBox,
+        silhouettes: &[Silhouette],
+        views: &[View],
+    ) -> Self {
+        let lattice = Lattice::around(vehicle_box);
+        let hull = hull_on(&lattice, silhouettes);
+        let input = network_input(&hull, &view_numbers(vehicle_box, views));
+        let answer = network.run(&input);
+        let [nx, ny, nz] = NODES;
+        let mut distance = vec![0.0f32; hull.len()];
+        let mut error = vec![0.0f32; hull.len()];
+        for (row, hull) in hull.chunks_exact(nx).enumerate() {
+            let (j, k) = (row / nz, row % nz);
+            let (correction, log_scale) = (answer.row(j, k), answer.row(ny + j, k));
+            for i in 0..nx {
+                let at = row * nx + i;
+                error[at] = UNIT_M * log_scale[i].clamp(*LOG_SCALE.start(), *LOG_SCALE.end()).exp();
+                distance[at] = hull[i].clamp(-UNIT_M, UNIT_M) + trust(error[at]) * UNIT_M * correction[i];
+            }
+        }
+        Self { lattice, distance, error }
+    }
+
+    /// The depth with its confidence, `c` = 1 / (1 + e / 0.05 m) where the network expects an error of `e`, times
+    /// what the depth had.
+    fn with_confidence(&self, view: &View, depth: DepthMap) -> Result<DepthMap> {
+        let width = depth.width();
+        let confidence = (0..depth.depth().len() as u32)
+            .into_par_iter()
+            .map(|pixel| {
+                let (u, v) = (pixel % width, pixel / width);
+                depth.get(u, v).map_or(0.0, |z| {
+                    let error = self.lattice.sample(&self.error, view.lift(u, v, z));
+                    depth.confidence().map_or(1.0, |c| c[pixel as usize]) / (1.0 + error / HALF_TRUSTED_M)
+                })
+            })
+            .collect();
+        depth.with_confidence(confidence)
+    }
+
+    /// On a fine grid, nowhere outside the hull, and the hull itself.
+    fn field(&self, vehicle_box: &VehicleBox, silhouettes: &[Silhouette]) -> (Field, Field) {
+        let (low, high) = (DVec3::from_array(vehicle_box.low), DVec3::from_array(vehicle_box.high));
+        let voxel = super::hull::voxel(vehicle_box);
+        let margin = DVec3::new(2.0 * voxel, 0.12, 2.0 * voxel);
+        let hull = Field::symmetric(low - margin, high + margin, voxel, |p| inside_both(silhouettes, p));
+        let mut field = hull.clone();
+        field.adjust(|p, hull| self.lattice.sample(&self.distance, p).min(hull + HULL_SLACK_M));
+        (field, hull)
+    }
+}
+
+/// The part of a correction that is applied: where the network does not know what it sees, the hull at least is
+/// what the silhouettes say.
+fn trust(error: f32) -> f32 {
+    1.0 - ((error - TRUSTED_M.start) / (TRUSTED_M.end - TRUSTED_M.start)).clamp(0.0, 1.0)
+}
+
+/// Channels as `training/shape/network.py` has them: hull slices along |y|, x, z, and the view numbers, constant.
+fn network_input(hull: &[f32], numbers: &[f32; VIEW_NUMBERS]) -> Planes {
+    let [nx, ny, nz] = NODES;
+    let mut input = Planes::new(ny + 2 + VIEW_NUMBERS, nz, nx);
+    let centered = |i: usize, n: usize| 2.0 * i as f32 / (n - 1) as f32 - 1.0;
+    for k in 0..nz {
+        for j in 0..ny {
+            let row = &hull[(j * nz + k) * nx..][..nx];
+            for (value, hull) in input.row_mut(j, k).iter_mut().zip(row) {
+                *value = hull / HULL_CLAMP_M;
+            }
+        }
+        for (i, value) in input.row_mut(ny, k).iter_mut().enumerate() {
+            *value = centered(i, nx);
+        }
+        input.row_mut(ny + 1, k).fill(centered(k, nz));
+        for (c, number) in numbers.iter().enumerate() {
+            input.row_mut(ny + 2 + c, k).fill(*number);
+        }
+    }
+    input
+}

@@ -1,0 +1,17 @@
+#!/bin/sh
+# Makes src/prior/shape/weights.bin again, from nothing: vehicles, training, parity data.
+# Usage: training/shape/make.sh PYTHON
+set -eu
+python=${1:?the Python with training/shape/requirements.txt installed}
+cd "$(dirname "$0")/../.."
+work=target/shape
+mkdir -p "$work" tests/data/shape
+vehicles() {
+    cargo run --release --locked --manifest-path training/vehicles/Cargo.toml -- data "$@"
+}
+vehicles --vehicles 3072 --seed 1 -o "$work/train.bin"
+vehicles --vehicles 300 --seed 1000 -o "$work/check.bin"
+PYTHONPATH=training/shape "$python" training/shape/train.py "$work/train.bin" --check "$work/check.bin" \
+    -o src/prior/shape/weights.bin
+PYTHONPATH=training/shape "$python" training/shape/parity.py src/prior/shape/weights.bin "$work/check.bin" \
+    -o tests/data/shape/parity.bin
