@@ -2,10 +2,10 @@
 
 use crate::error::{Error, Result};
 use crate::symmetry::SymmetryMode;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Which depth source.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PriorChoice {
     /// `Given` if every used view has depth, else the best prior without: `Hull`.
@@ -15,6 +15,17 @@ pub enum PriorChoice {
     Given,
     /// The visual hull of the silhouettes and their mirrored twins.
     Hull,
+}
+
+/// Whether the plane of symmetry and the cameras are corrected before anything else, see [`crate::calibrate`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Calibrate {
+    /// Where the silhouettes do not agree, and agree better with the correction.
+    #[default]
+    Auto,
+    /// The caller's cameras are taken as they are.
+    Off,
 }
 
 /// What the plan would leave out, kept nevertheless; all `false` by default.
@@ -37,6 +48,8 @@ pub struct Keep {
 pub struct Options {
     /// Depth source.
     pub prior: PriorChoice,
+    /// Whether cameras are corrected where the silhouettes contradict them.
+    pub calibrate: Calibrate,
     /// When Gaussians are cloned across y = 0.
     pub symmetry: SymmetryMode,
     /// Length, width, height in metres, where known.
@@ -57,6 +70,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             prior: PriorChoice::Auto,
+            calibrate: Calibrate::Auto,
             symmetry: SymmetryMode::Auto,
             vehicle_size: None,
             sh_degree: 2,

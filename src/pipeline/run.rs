@@ -1,10 +1,12 @@
-//! The run: plan -> undistort -> prior -> pixels -> head -> symmetry -> check.
+//! The run: plan -> undistort -> calibrate -> prior -> pixels -> head -> symmetry -> check.
 
-use super::options::{Options, PriorChoice};
+use super::options::{Calibrate, Options, PriorChoice};
 use super::report::{Clock, InputError, Report, peak_rss_bytes};
 use super::{pixels, plan};
+use crate::calibrate::{self, Calibrated, Moved};
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
+use crate::geometry::Similarity;
 use crate::head::surfel::FOOTPRINT_SIGMA_PX;
 use crate::head::{GaussianHead, SurfelHead};
 use crate::metrics;
@@ -37,6 +39,15 @@ pub struct PointCloud {
     pub colors: Vec<[u8; 3]>,
 }
 
+impl PointCloud {
+    fn transformed(mut self, to_from: &Similarity) -> Self {
+        for p in &mut self.positions {
+            *p = to_from.transform_point(Vec3::from_array(*p).as_dvec3()).as_vec3().to_array();
+        }
+        self
+    }
+}
+
 /// Reconstructs the vehicle of `scene`. `progress` is called on this thread at every stage boundary and inside
 /// the long stages; if it breaks, the call returns [`Error::Cancelled`].
 pub fn reconstruct<'a>(
@@ -67,6 +78,16 @@ pub fn reconstruct_on<'a>(
     let views = undistorted(scene, &used, &context)?;
     clock.lap("undistort");
 
+    context.report("calibrate", 0.0)?;
+    let Calibrated { moved, report: calibration, left_out: why } = match options.calibrate {
+        Calibrate::Auto => calibrate::calibrate(&views, &context)?,
+        Calibrate::Off => Calibrated::default(),
+    };
+    plan::note(&mut left_out, "calibration", why.unwrap_or_default(), usize::from(why.is_some()));
+    // From here to the symmetry all is in the frame whose y = 0 is the plane that was found.
+    let views = moved.as_ref().map_or(views, |moved| moved.views.clone());
+    clock.lap("calibrate");
+
     context.report("prior", 0.0)?;
     let prior = chosen_prior(plan::prior(&views, options), options);
     let mut geometry = prior.estimate(&views, &context)?;
@@ -93,6 +114,10 @@ pub fn reconstruct_on<'a>(
     let (gaussians, completion) =
         context.parallel(|| complete(gaussians, options.symmetry, &views, &geometry));
     plan::note(&mut left_out, "clones", "the mirrored place was observed by a view", completion.not_needed);
+    let (gaussians, points, views) = match &moved {
+        Some(moved) => back_in_vehicle(gaussians, points, moved, &context)?,
+        None => (gaussians, points, views),
+    };
     clock.lap("symmetry");
 
     let input_error = match options.check {
@@ -114,6 +139,7 @@ pub fn reconstruct_on<'a>(
         sh_degree: gaussians.sh_degree(),
         extent_m: gaussians.bounds(),
         views_used: views.iter().map(|v| v.name.clone()).collect(),
+        calibration,
         vehicle_box: geometry.vehicle_box.map(Into::into),
         left_out,
         symmetry: completion,
@@ -192,6 +218,18 @@ fn mirrored_place(gaussians: &Gaussians, i: usize) -> (Vec3, Vec3, f32) {
     let normal = Quat::from_xyzw(x, y, z, w) * Vec3::Z;
     let coarsest = gaussians.scales()[i].into_iter().fold(0.0, f32::max);
     (Vec3::from_array(gaussians.means()[i]) * flip, normal * flip, FOOTPRINT_SIGMA_PX / coarsest)
+}
+
+/// All in the caller's frame again, the views with the cameras that the calibration found.
+fn back_in_vehicle(
+    gaussians: Gaussians,
+    points: Option<PointCloud>,
+    moved: &Moved,
+    context: &Context,
+) -> Result<(Gaussians, Option<PointCloud>, Vec<View>)> {
+    let back = &moved.vehicle_from_corrected;
+    let gaussians = context.parallel(|| gaussians.transformed(back))?;
+    Ok((gaussians, points.map(|cloud| cloud.transformed(back)), moved.in_vehicle.clone()))
 }
 
 /// The model drawn into the views it came from.

@@ -52,6 +52,7 @@ pub(crate) fn reconstruct<'py>(
         check,
         threads,
         points,
+        calibrate: vg::pipeline::Calibrate::default(),
     };
     // Before the pixels are copied.
     options.validate().map_err(|e| from_library(py, e))?;

@@ -2,7 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
-use vg::pipeline::{Keep, Options, PriorChoice};
+use vg::pipeline::{Calibrate, Keep, Options, PriorChoice};
 use vg::render::Background;
 use vg::symmetry::SymmetryMode;
 
@@ -42,6 +42,10 @@ pub(crate) struct MethodArgs {
     /// Mirror what was not observed (auto), all of the denser side (always), or nothing (never)
     #[arg(long, value_enum, default_value_t = Symmetry::Auto)]
     symmetry: Symmetry,
+    /// Correct the plane of symmetry and the cameras where the silhouettes contradict them (auto), or take them as
+    /// they are (off)
+    #[arg(long, value_enum, default_value_t = Calibration::Auto)]
+    calibrate: Calibration,
     /// Length, width and height of the vehicle in metres, where known
     #[arg(long = "box", value_name = "L,W,H", value_parser = vehicle_size)]
     vehicle_size: Option<VehicleSize>,
@@ -70,6 +74,10 @@ impl MethodArgs {
                 Symmetry::Auto => SymmetryMode::Auto,
                 Symmetry::Always => SymmetryMode::Always,
                 Symmetry::Never => SymmetryMode::Never,
+            },
+            calibrate: match self.calibrate {
+                Calibration::Auto => Calibrate::Auto,
+                Calibration::Off => Calibrate::Off,
             },
             vehicle_size: self.vehicle_size.map(|s| s.0),
             sh_degree: self.sh_degree,
@@ -235,6 +243,12 @@ enum Symmetry {
     Auto,
     Always,
     Never,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Calibration {
+    Auto,
+    Off,
 }
 
 /// The fields of [`Keep`].

@@ -6,6 +6,6 @@ pub(crate) mod field;
 pub(crate) mod march;
 pub(crate) mod silhouette;
 
-pub(crate) use extent::{estimate_box, inside_all, inside_box, place_box};
+pub(crate) use extent::{estimate_box, inside_all, inside_box, place_box, whereabouts};
 pub(crate) use field::Field;
 pub(crate) use silhouette::Silhouette;
