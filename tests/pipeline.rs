@@ -106,7 +106,7 @@ fn every_stage_can_be_cancelled_and_says_which_it_was() {
         ControlFlow::Continue(())
     })
     .unwrap();
-    assert_eq!(stages, ["plan", "undistort", "prior", "pixels", "head", "symmetry", "check"]);
+    assert_eq!(stages, ["plan", "undistort", "calibrate", "prior", "pixels", "head", "symmetry", "check"]);
     for stop in 0..calls {
         let mut call = 0;
         let result = reconstruct(&scene, &Options::default(), &mut |_| {

@@ -5,7 +5,7 @@ use super::guard::guarded;
 use super::read::{self, Versioned};
 use super::status::{c_string, one_line, vg_status};
 use crate::error::{Error, Result};
-use crate::pipeline::{Keep, Options, PriorChoice};
+use crate::pipeline::{Calibrate, Keep, Options, PriorChoice};
 use crate::symmetry::SymmetryMode;
 use std::ffi::{CString, c_char, c_void};
 
@@ -154,6 +154,7 @@ impl vg_options {
             vehicle_size: (!unknown_size).then_some(self.vehicle_size),
             sh_degree: sh_degree("options.sh_degree", self.sh_degree)?,
             keep: keep(self.keep)?,
+            calibrate: Calibrate::default(),
             check: read::flag("options.check", self.check)?,
             photo: true,
             points: read::flag("options.points", self.points)?,

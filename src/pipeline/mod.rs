@@ -6,6 +6,6 @@ mod plan;
 pub mod report;
 pub mod run;
 
-pub use options::{Keep, Options, PriorChoice};
+pub use options::{Calibrate, Keep, Options, PriorChoice};
 pub use report::{InputError, LeftOut, Report, Stage};
 pub use run::{PointCloud, Reconstruction, reconstruct, reconstruct_on};

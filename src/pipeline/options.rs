@@ -3,10 +3,10 @@
 use crate::error::{Error, Result};
 use crate::relight::Relight;
 use crate::symmetry::SymmetryMode;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Which depth source.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PriorChoice {
     /// `Given` if every used view has depth, else the best prior without: `Shape`.
@@ -18,6 +18,17 @@ pub enum PriorChoice {
     Hull,
     /// The hull, corrected by what vehicles look like.
     Shape,
+}
+
+/// Whether the plane of symmetry and the cameras are corrected before anything else, see [`crate::calibrate`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Calibrate {
+    /// Where the silhouettes do not agree, and agree better with the correction.
+    #[default]
+    Auto,
+    /// The caller's cameras are taken as they are.
+    Off,
 }
 
 /// What the plan would leave out, kept nevertheless; all `false` by default.
@@ -40,6 +51,8 @@ pub struct Keep {
 pub struct Options {
     /// Depth source.
     pub prior: PriorChoice,
+    /// Whether cameras are corrected where the silhouettes contradict them.
+    pub calibrate: Calibrate,
     /// When Gaussians are cloned across y = 0.
     pub symmetry: SymmetryMode,
     /// Whether clones are shown in the light of their own side.
@@ -64,6 +77,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             prior: PriorChoice::Auto,
+            calibrate: Calibrate::Auto,
             symmetry: SymmetryMode::Auto,
             relight: Relight::Auto,
             vehicle_size: None,

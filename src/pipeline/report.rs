@@ -1,6 +1,7 @@
 //! What a reconstruction did, how long it took, what it left out, and the error it can know.
 
 use super::options::Options;
+use crate::calibrate::Calibration;
 use crate::prior::{BoxSource, Filled, PhotoFit, PointFit, VehicleBox};
 use crate::relight::Relighting;
 use crate::symmetry::Completion;
@@ -10,7 +11,7 @@ use std::time::Instant;
 /// One stage of the run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Stage {
-    /// plan, undistort, prior, pixels, head, symmetry, check.
+    /// plan, undistort, calibrate, prior, pixels, head, symmetry, check.
     pub name: &'static str,
     /// Wall time, milliseconds.
     pub ms: f64,
@@ -19,7 +20,7 @@ pub struct Stage {
 /// Something the scene did not need.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct LeftOut {
-    /// What: views, pixels, SH bands, clones.
+    /// What: views, calibration, pixels, SH bands, clones.
     pub what: String,
     /// Why it is not needed.
     pub why: String,
@@ -74,11 +75,13 @@ pub struct Report {
     pub gaussians: usize,
     /// SH degree of the result.
     pub sh_degree: u8,
-    /// Lowest and highest centre, metres.
+    /// Lowest and highest centre in the caller's vehicle frame, metres.
     pub extent_m: Option<([f32; 3], [f32; 3])>,
     /// Names of the views that were used.
     pub views_used: Vec<String>,
-    /// The box the prior worked in.
+    /// How the cameras were corrected; `None` if that was switched off or these views cannot be calibrated.
+    pub calibration: Option<Calibration>,
+    /// The box the prior worked in, in the corrected frame: its sides are parallel to the plane of symmetry.
     #[serde(rename = "box")]
     pub vehicle_box: Option<BoxReport>,
     /// What the prior made of the scene's cloud.

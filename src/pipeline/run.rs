@@ -1,10 +1,12 @@
-//! The run: plan -> undistort -> prior -> pixels -> head -> symmetry -> check.
+//! The run: plan -> undistort -> calibrate -> prior -> pixels -> head -> symmetry -> check.
 
-use super::options::{Options, PriorChoice};
+use super::options::{Calibrate, Options, PriorChoice};
 use super::report::{Clock, InputError, Report, peak_rss_bytes};
 use super::{pixels, plan};
+use crate::calibrate::{self, Calibrated, Moved};
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
+use crate::geometry::Similarity;
 use crate::head::surfel::FOOTPRINT_SIGMA_PX;
 use crate::head::{GaussianHead, SurfelHead};
 use crate::metrics;
@@ -13,7 +15,7 @@ use crate::progress::{Context, ProgressCallback, Threads};
 use crate::relight::{Light, Relight, Relighting};
 use crate::render::{CpuRenderer, RenderOptions, Renderer};
 use crate::scene::visibility::{Observer, SURFACE_M, Sight};
-use crate::scene::{Scene, View, undistort};
+use crate::scene::{Cloud, Scene, View, undistort};
 use crate::symmetry::{self, Completion, MirroredPlace, SymmetryMode};
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
@@ -36,6 +38,15 @@ pub struct PointCloud {
     pub positions: Vec<[f32; 3]>,
     /// sRGB. `[n][3]`
     pub colors: Vec<[u8; 3]>,
+}
+
+impl PointCloud {
+    fn transformed(mut self, to_from: &Similarity) -> Self {
+        for p in &mut self.positions {
+            *p = to_from.transform_point(Vec3::from_array(*p).as_dvec3()).as_vec3().to_array();
+        }
+        self
+    }
 }
 
 /// Reconstructs the vehicle of `scene`. `progress` is called on this thread at every stage boundary and inside
@@ -68,8 +79,22 @@ pub fn reconstruct_on<'a>(
     let views = undistorted(scene, &used, &context)?;
     clock.lap("undistort");
 
+    context.report("calibrate", 0.0)?;
+    let Calibrated { moved, report: calibration, left_out: why } = match options.calibrate {
+        Calibrate::Auto => calibrate::calibrate(&views, &context)?,
+        Calibrate::Off => Calibrated::default(),
+    };
+    plan::note(&mut left_out, "calibration", why.unwrap_or_default(), usize::from(why.is_some()));
+    // From here to the symmetry all is in the frame whose y = 0 is the plane that was found.
+    let views = moved.as_ref().map_or(views, |moved| moved.views.clone());
+    clock.lap("calibrate");
+
     context.report("prior", 0.0)?;
-    let prior = chosen_prior(plan::prior(&views, options), scene, options);
+    let cloud = scene.cloud.as_ref().map(|cloud| match &moved {
+        Some(moved) => cloud.in_frame(&moved.vehicle_from_corrected),
+        None => cloud.clone(),
+    });
+    let prior = chosen_prior(plan::prior(&views, options), cloud, options);
     let mut geometry = prior.estimate(&views, &context)?;
     geometry.find_normals(&views, &context);
     if let Some(cloud) = &scene.cloud {
@@ -97,6 +122,10 @@ pub fn reconstruct_on<'a>(
     let (gaussians, completion, relight) =
         context.parallel(|| complete(gaussians, options, &views, &geometry));
     plan::note(&mut left_out, "clones", "the mirrored place was observed by a view", completion.not_needed);
+    let (gaussians, points, views) = match &moved {
+        Some(moved) => back_in_vehicle(gaussians, points, moved, &context)?,
+        None => (gaussians, points, views),
+    };
     clock.lap("symmetry");
 
     let input_error = match options.check {
@@ -118,6 +147,7 @@ pub fn reconstruct_on<'a>(
         sh_degree: gaussians.sh_degree(),
         extent_m: gaussians.bounds(),
         views_used: views.iter().map(|v| v.name.clone()).collect(),
+        calibration,
         vehicle_box: geometry.vehicle_box.map(Into::into),
         cloud: geometry.points,
         photo: geometry.photo,
@@ -135,14 +165,12 @@ fn undistorted(scene: &Scene, used: &[usize], context: &Context) -> Result<Vec<V
     context.parallel(|| used.par_iter().map(|&i| undistort::undistorted(&scene.views[i])).collect())
 }
 
-fn chosen_prior(choice: PriorChoice, scene: &Scene, options: &Options) -> Box<dyn DepthPrior> {
+fn chosen_prior(choice: PriorChoice, cloud: Option<Cloud>, options: &Options) -> Box<dyn DepthPrior> {
+    let size = options.vehicle_size;
     match choice {
         PriorChoice::Given => Box::new(GivenDepth),
-        PriorChoice::Hull => Box::new(HullPrior { size: options.vehicle_size, cloud: scene.cloud.clone() }),
-        PriorChoice::Shape | PriorChoice::Auto => {
-            let (size, cloud) = (options.vehicle_size, scene.cloud.clone());
-            Box::new(ShapePrior { size, cloud, photo: options.photo })
-        }
+        PriorChoice::Hull => Box::new(HullPrior { size, cloud }),
+        PriorChoice::Shape | PriorChoice::Auto => Box::new(ShapePrior { size, cloud, photo: options.photo }),
     }
 }
 
@@ -211,6 +239,18 @@ fn mirrored_place(gaussians: &Gaussians, i: usize) -> (Vec3, Vec3, f32) {
     let normal = Quat::from_xyzw(x, y, z, w) * Vec3::Z;
     let coarsest = gaussians.scales()[i].into_iter().fold(0.0, f32::max);
     (Vec3::from_array(gaussians.means()[i]) * flip, normal * flip, FOOTPRINT_SIGMA_PX / coarsest)
+}
+
+/// All in the caller's frame again, the views with the cameras that the calibration found.
+fn back_in_vehicle(
+    gaussians: Gaussians,
+    points: Option<PointCloud>,
+    moved: &Moved,
+    context: &Context,
+) -> Result<(Gaussians, Option<PointCloud>, Vec<View>)> {
+    let back = &moved.vehicle_from_corrected;
+    let gaussians = context.parallel(|| gaussians.transformed(back))?;
+    Ok((gaussians, points.map(|cloud| cloud.transformed(back)), moved.in_vehicle.clone()))
 }
 
 /// The model drawn into the views it came from.

@@ -1,6 +1,8 @@
 //! Points measured on the vehicle, besides the photographs: a LiDAR sweep, a scan, triangulated features.
 
 use crate::error::{Error, Result};
+use crate::geometry::Similarity;
+use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
 /// Most points of a cloud.
@@ -27,6 +29,18 @@ impl Cloud {
     /// Vehicle frame, metres. `[n][3]`
     pub fn points(&self) -> &[[f32; 3]] {
         &self.0
+    }
+
+    /// The same points in a frame that lies at `vehicle_from_frame`, a rigid motion, in theirs.
+    pub fn in_frame(&self, vehicle_from_frame: &Similarity) -> Self {
+        let back = vehicle_from_frame.rotation.transpose();
+        let largest = DVec3::splat(f64::from(f32::MAX));
+        let point = |p: &[f32; 3]| {
+            let p = back * (Vec3::from_array(*p).as_dvec3() - vehicle_from_frame.translation);
+            // A turn can take the largest number beyond itself.
+            p.clamp(-largest, largest).as_vec3().to_array()
+        };
+        Self(self.0.iter().map(point).collect())
     }
 }
 

@@ -73,7 +73,7 @@ def test_progress_is_told_on_the_calling_thread_in_the_order_of_the_stages(ellip
 
     vg.reconstruct(ellipsoid.images, ellipsoid.masks, ellipsoid.cameras, progress=progress)
     stages = list(dict.fromkeys(stage for stage, _, _ in told))
-    assert stages == ["plan", "undistort", "prior", "pixels", "head", "symmetry", "check"]
+    assert stages == ["plan", "undistort", "calibrate", "prior", "pixels", "head", "symmetry", "check"]
     assert {thread for _, _, thread in told} == {threading.get_ident()}
     assert all(0 <= fraction <= 1 for _, fraction, _ in told)
 

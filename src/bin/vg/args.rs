@@ -2,7 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
-use vg::pipeline::{Keep, Options, PriorChoice};
+use vg::pipeline::{Calibrate, Keep, Options, PriorChoice};
 use vg::relight::Relight;
 use vg::render::Background;
 use vg::symmetry::SymmetryMode;
@@ -48,6 +48,10 @@ pub(crate) struct MethodArgs {
     /// they were seen (never)
     #[arg(long, value_enum, default_value_t = Relit::Auto)]
     relight: Relit,
+    /// Correct the plane of symmetry and the cameras where the silhouettes contradict them (auto), or take them as
+    /// they are (off)
+    #[arg(long, value_enum, default_value_t = Calibration::Auto)]
+    calibrate: Calibration,
     /// Length, width and height of the vehicle in metres, where known
     #[arg(long = "box", value_name = "L,W,H", value_parser = vehicle_size)]
     vehicle_size: Option<VehicleSize>,
@@ -87,6 +91,10 @@ impl MethodArgs {
             relight: match self.relight {
                 Relit::Auto => Relight::Auto,
                 Relit::Never => Relight::Never,
+            },
+            calibrate: match self.calibrate {
+                Calibration::Auto => Calibrate::Auto,
+                Calibration::Off => Calibrate::Off,
             },
             vehicle_size: self.vehicle_size.map(|s| s.0),
             sh_degree: self.sh_degree,
@@ -264,6 +272,12 @@ enum Symmetry {
 enum Relit {
     Auto,
     Never,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Calibration {
+    Auto,
+    Off,
 }
 
 /// The fields of [`Keep`].

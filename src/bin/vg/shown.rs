@@ -9,7 +9,7 @@ use vg::progress::Progress;
 const STEPS: u64 = 100;
 
 /// The stages in order, as a reconstruction reports them.
-const STAGES: [&str; 7] = ["plan", "undistort", "prior", "pixels", "head", "symmetry", "check"];
+const STAGES: [&str; 8] = ["plan", "undistort", "calibrate", "prior", "pixels", "head", "symmetry", "check"];
 
 /// A bar on standard error, where that is a terminal; else nothing.
 pub(crate) struct Bar(ProgressBar);

@@ -100,6 +100,13 @@ fn half_width_at_the_wheels(low: DVec3, high: DVec3, inside: impl Fn(Vec3) -> f3
     Some(widths[ground + 2] + 0.5 * STEP_M)
 }
 
+/// About where the vehicle is and how far it reaches from there, metres, from where the views look; `None` where
+/// they look at no common place.
+pub fn whereabouts(views: &[View]) -> Option<(DVec3, f64)> {
+    let center = meeting_point(views);
+    search_radius(views, center).ok().map(|radius| (center, radius))
+}
+
 /// The point nearest to all central rays and their mirror images; it lies on y = 0. Views that all look along
 /// x leave the distance open: a weak pull to the origin of the vehicle frame closes it.
 fn meeting_point(views: &[View]) -> DVec3 {

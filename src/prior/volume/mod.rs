@@ -9,7 +9,7 @@ pub(crate) mod points;
 pub(crate) mod relax;
 pub mod silhouette;
 
-pub use extent::{estimate_box, inside_all, inside_both, inside_box, place_box};
+pub use extent::{estimate_box, inside_all, inside_both, inside_box, place_box, whereabouts};
 pub(crate) use field::Field;
 pub use fill::Filled;
 pub(crate) use fill::fill_masks;

@@ -57,9 +57,13 @@ impl Silhouette {
     /// How far `point` (vehicle frame) is inside this view's cone, metres, negative outside; infinite where
     /// the view makes no statement: behind the camera or beyond a border that cuts the silhouette.
     pub fn inside(&self, point: Vec3) -> f32 {
+        self.inside_camera(self.camera_from_vehicle.0 * point + self.camera_from_vehicle.1)
+    }
+
+    /// The same for a point in the camera's frame, for a camera that is moved.
+    pub(crate) fn inside_camera(&self, p: Vec3) -> f32 {
         // Nearer than this, a point is inside the camera rather than in its picture.
         const NEAR_M: f32 = 0.05;
-        let p = self.camera_from_vehicle.0 * point + self.camera_from_vehicle.1;
         if p.z < NEAR_M {
             // A picture that shows the whole vehicle leaves none behind the camera.
             return if self.cut.contains(&true) { f32::INFINITY } else { p.z - NEAR_M - 1.0 };
