@@ -157,6 +157,7 @@ impl vg_options {
             calibrate: Calibrate::default(),
             check: read::flag("options.check", self.check)?,
             photo: true,
+            budget_s: None,
             points: read::flag("options.points", self.points)?,
             // Not in the C options yet.
             relight: Default::default(),

@@ -67,6 +67,8 @@ pub struct Options {
     pub check: bool,
     /// Whether the `Shape` prior moves its surface to where the photographs agree.
     pub photo: bool,
+    /// Seconds the whole call may take, where that matters: the plan then chooses what to leave out.
+    pub budget_s: Option<f64>,
     /// Worker threads; 0 means one per core.
     pub threads: usize,
     /// Whether to return the metric coloured point cloud as well.
@@ -85,6 +87,7 @@ impl Default for Options {
             keep: Keep::default(),
             check: true,
             photo: true,
+            budget_s: None,
             threads: 0,
             points: false,
         }
@@ -103,6 +106,11 @@ impl Options {
                     "length, width, height, each 0.1 to 30 m",
                 ));
             }
+        }
+        if let Some(budget) = self.budget_s
+            && !(budget > 0.0 && budget.is_finite())
+        {
+            return Err(Error::argument("options.budget_s", budget.to_string(), "seconds above 0"));
         }
         if self.sh_degree > crate::gaussians::sh::MAX_DEGREE {
             return Err(Error::argument("options.sh_degree", self.sh_degree.to_string(), "0 to 3"));

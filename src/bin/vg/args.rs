@@ -64,6 +64,9 @@ pub(crate) struct MethodArgs {
     /// What the plan may not leave out, separated by commas
     #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
     keep: Vec<KeepItem>,
+    /// Seconds the reconstruction may take: what does not fit is left out
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    budget: Option<f64>,
     /// Do not move the shape prior's surface to where the photographs agree
     #[arg(long)]
     no_photo: bool,
@@ -107,6 +110,7 @@ impl MethodArgs {
             },
             check: true,
             photo: !self.no_photo,
+            budget_s: self.budget,
             threads: self.threads,
             points: false,
         }
