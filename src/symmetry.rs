@@ -13,7 +13,7 @@ use serde::Serialize;
 #[serde(rename_all = "lowercase")]
 pub enum SymmetryMode {
     /// Each place is shown by the better of its own observation and its mirror image's: Gaussians are cloned
-    /// where no view saw the mirrored place, and give way where it was seen much better.
+    /// where no view saw the mirrored place, and give way where it was seen better.
     #[default]
     Auto,
     /// The paper's rule: the side with more Gaussians is the reference; the other side becomes its mirror
@@ -43,7 +43,7 @@ pub struct Completion {
     /// Gaussians added as mirror images.
     pub cloned: usize,
     /// Observed Gaussians given up for mirror images: the whole other side (`Always`), or those whose mirrored
-    /// place was seen much better (`Auto`).
+    /// place was seen better (`Auto`).
     pub replaced: usize,
     /// Gaussians not cloned because their mirrored place was observed too (`Auto`).
     pub not_needed: usize,
@@ -52,11 +52,11 @@ pub struct Completion {
 /// How well the mirrored place of a Gaussian was observed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MirroredPlace {
-    /// Not, or much worse than the Gaussian itself.
+    /// Not, or worse than the Gaussian itself.
     Unseen,
     /// About as well.
     Seen,
-    /// Much better.
+    /// Better.
     SeenBetter,
 }
 

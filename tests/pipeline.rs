@@ -5,6 +5,7 @@ mod common;
 use common::vehicle::{camera, right_side, view, without_depth};
 use std::ops::ControlFlow;
 use vg::pipeline::{Keep, Options, PriorChoice, Reconstruction, reconstruct};
+use vg::relight::Relight;
 use vg::render::{Background, CpuRenderer, RenderOptions, Renderer};
 use vg::scene::mask::Label;
 use vg::scene::{DepthMap, Mask, RgbImage};
@@ -228,6 +229,89 @@ fn where_both_sides_are_seen_nothing_is_cloned_but_what_is_missing() {
     assert!(left_out(&both, "mirrored place") > 1000);
 }
 
+/// Mean absolute difference of colour within `band` metres of the plane and beyond it, and the least alpha within,
+/// two pixels and more inside the silhouette; at front and rear, for no view
+/// shows the middle of the roof, and above the sill.
+fn seam(made: &Reconstruction, truth: &View, band: f32) -> (f32, f32, f32) {
+    let transparent = RenderOptions { background: Background::Transparent, ..RenderOptions::default() };
+    let drawn = CpuRenderer::new().render(&made.gaussians, &truth.camera, &transparent).unwrap();
+    let (mask, depth) = (truth.mask.as_ref().unwrap(), truth.depth.as_ref().unwrap());
+    let (width, height) = (truth.camera.width, truth.camera.height);
+    let (mut near, mut far, mut least) = ((0.0, 0.0f32), (0.0, 0.0f32), 1.0f32);
+    for (v, u) in (2..height - 2).flat_map(|v| (2..width - 2).map(move |u| (v, u))) {
+        if (v - 2..=v + 2).all(|y| (u - 2..=u + 2).all(|x| mask.is_vehicle(x, y))) {
+            let i = (v * width + u) as usize;
+            let expected = truth.image.get(u, v).map(|c| f32::from(c) / 255.0);
+            let error: f32 = drawn.color[i].iter().zip(expected).map(|(a, b)| (a - b).abs() / 3.0).sum();
+            let place = truth.lift(u, v, depth.get(u, v).unwrap());
+            if place.x.abs() < 1.6 || place.z < -0.2 {
+                continue;
+            }
+            let side = if place.y.abs() < band { &mut near } else { &mut far };
+            *side = (side.0 + error, side.1 + 1.0);
+            if place.y.abs() < band {
+                least = least.min(drawn.alpha[i]);
+            }
+        }
+    }
+    assert!(near.1 > 100.0 && far.1 > 100.0, "the view shows no seam");
+    (near.0 / near.1, far.0 / far.1, least)
+}
+
+#[test]
+fn front_and_rear_neither_tear_nor_double_along_the_plane() {
+    let scene = right_side(320, 240);
+    for (symmetry, azimuth) in
+        [SymmetryMode::Auto, SymmetryMode::Always].into_iter().flat_map(|s| [(s, 8.0), (s, 172.0)])
+    {
+        let made = run(&scene, &Options { symmetry, ..Options::default() });
+        let truth = view("across", camera(azimuth, 6.5, 320, 240));
+        let (near, far, least) = seam(&made, &truth, 0.05);
+        assert!(near < 0.02 && near < far, "{symmetry:?} at {azimuth}: {near} beside {far}");
+        assert!(least > 0.9, "{symmetry:?} at {azimuth}: alpha {least}");
+        // The test notices a seam that is open by the width of two surfels.
+        let mut torn = made.clone();
+        let closed: Vec<bool> = torn.gaussians.means().iter().map(|m| m[1].abs() > 0.03).collect();
+        torn.gaussians.retain(&closed);
+        assert!(seam(&torn, &truth, 0.05).2 < 0.5);
+    }
+}
+
+#[test]
+fn clones_are_relit_unless_that_is_switched_off() {
+    // A right side that is darker than front, rear and top: the sun is on the left.
+    let mut scene = right_side(160, 120);
+    for view in &mut scene.views {
+        let (depth, camera) = (view.depth.clone().unwrap(), view.camera);
+        let shade = |i: usize| {
+            let (u, v) = (i as u32 % camera.width, i as u32 / camera.width);
+            let normal = depth.get(u, v).map(|z| {
+                let p = view.lift(u, v, z).as_dvec3();
+                (p / common::vehicle::HALF / common::vehicle::HALF).normalize()
+            });
+            let sun = glam::DVec3::new(0.3, 0.6, 0.7).normalize();
+            let light = normal.map_or(1.0, |n| 0.2 * (1.0 + 3.0 * n.dot(sun).max(0.0)));
+            [(255.0 * (0.5 * light).powf(1.0 / 2.2)) as u8; 3]
+        };
+        let pixels = (0..(camera.width * camera.height) as usize).map(shade).collect();
+        view.image = RgbImage::new(camera.width, camera.height, pixels).unwrap();
+    }
+    let relit = run(&scene, &Options::default());
+    let mirrored = run(&scene, &Options { relight: Relight::Never, ..Options::default() });
+    let done = relit.report.relight.unwrap();
+    assert!(done.left_over_right > 1.1 && done.sun[1] > 0.1, "{done:?}");
+    assert_eq!(done.clones, relit.report.symmetry.cloned);
+    assert_eq!(mirrored.report.relight, None);
+    let observed = relit.gaussians.len() - done.clones;
+    let stride = relit.gaussians.sh().len() / relit.gaussians.len();
+    let (a, b) = (relit.gaussians.sh(), mirrored.gaussians.sh());
+    assert_eq!(a[..observed * stride], b[..observed * stride]);
+    let mean = |sh: &[f32]| sh.chunks(stride).map(|c| c[0]).sum::<f32>() / done.clones as f32;
+    assert!(mean(&a[observed * stride..]) > mean(&b[observed * stride..]) + 0.05);
+    let never = Options { symmetry: SymmetryMode::Never, ..Options::default() };
+    assert_eq!(run(&scene, &never).report.relight, None);
+}
+
 // Extreme input (method section 8): an error that names the argument, or a finite result.
 
 fn is_finite(made: &Reconstruction) -> bool {
@@ -371,7 +455,7 @@ fn nothing_the_caller_owns_is_changed() {
 #[test]
 fn never_leaves_the_unseen_side_empty_and_always_makes_it_the_mirror_image() {
     let scene = right_side(160, 120);
-    let with = |symmetry| run(&scene, &Options { symmetry, ..Options::default() });
+    let with = |symmetry| run(&scene, &Options { symmetry, relight: Relight::Never, ..Options::default() });
     let never = with(SymmetryMode::Never);
     let always = with(SymmetryMode::Always);
     assert_eq!(never.report.symmetry.cloned, 0);

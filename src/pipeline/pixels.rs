@@ -10,8 +10,8 @@ use crate::scene::{DepthMap, View};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Another view must show a place this much better before a pixel is given up for it.
-const BETTER: f32 = 1.1;
+/// Another view, or a mirror image, must show a place this much better before what was observed is given up for it.
+pub(super) const BETTER: f32 = 1.1;
 
 /// Two depths belong to one surface when they differ by less than this many pixel footprints.
 const SURFACE_FOOTPRINTS: f32 = 6.0;

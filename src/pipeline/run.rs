@@ -1,8 +1,9 @@
 //! The run: plan -> undistort -> calibrate -> prior -> pixels -> head -> symmetry -> check.
 
 use super::options::{Calibrate, Options, PriorChoice};
+use super::pixels::{self, BETTER};
+use super::plan;
 use super::report::{Clock, InputError, Report, peak_rss_bytes};
-use super::{pixels, plan};
 use crate::calibrate::{self, Calibrated, Moved};
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
@@ -199,8 +200,6 @@ fn complete(
     views: &[View],
     geometry: &Geometry,
 ) -> (Gaussians, Completion, Option<Relighting>) {
-    /// Seen at this many times the resolution is much better.
-    const MUCH_BETTER: f32 = 1.5;
     let cameras: Vec<_> = views.iter().map(|v| v.camera).collect();
     let verdict = |observers: &[Observer], gaussians: &Gaussians, i: usize| {
         let (place, normal, own) = mirrored_place(gaussians, i);
@@ -208,11 +207,11 @@ fn complete(
         for observer in observers {
             // Most views look at the other side: they need no look-up.
             let resolution = observer.resolution(place, normal);
-            if resolution <= own / MUCH_BETTER {
+            if resolution <= own / BETTER {
                 continue;
             }
             match observer.sight(place, SURFACE_M) {
-                Sight::Surface if resolution > MUCH_BETTER * own => return MirroredPlace::SeenBetter,
+                Sight::Surface if resolution > BETTER * own => return MirroredPlace::SeenBetter,
                 Sight::Surface | Sight::Through => mirrored = MirroredPlace::Seen,
                 Sight::Background | Sight::Silent => {}
             }
