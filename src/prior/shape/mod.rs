@@ -37,6 +37,9 @@ const TRUSTED_M: std::ops::Range<f32> = 0.10..0.30;
 /// The hull may be this much too thin, metres: masks and poses are not exact.
 const HULL_SLACK_M: f32 = 0.02;
 
+/// The predicted surface is drawn in by this much, metres: a surfel reaches about half a pixel beyond its centre.
+const INSET_M: f32 = 0.01;
+
 /// See the module's documentation.
 #[derive(Clone, Debug, Default)]
 pub struct ShapePrior {
@@ -145,7 +148,7 @@ impl Shape {
         let margin = DVec3::new(2.0 * voxel, 0.12, 2.0 * voxel);
         let hull = Field::symmetric(low - margin, high + margin, voxel, |p| inside_both(silhouettes, p));
         let mut field = hull.clone();
-        field.adjust(|p, hull| self.lattice.sample(&self.distance, p).min(hull + HULL_SLACK_M));
+        field.adjust(|p, hull| (self.lattice.sample(&self.distance, p) - INSET_M).min(hull + HULL_SLACK_M));
         (field, hull)
     }
 }

@@ -16,8 +16,9 @@ use serde::Serialize;
 /// Rays that were missed once more after a bend: the membrane gives way between the pulls.
 const ROUNDS: usize = 2;
 
-/// How far inside the missed pixels should be, metres: anything more spills over the silhouette.
-const INSIDE_M: f32 = 0.0;
+/// A surfel reaches about this many pixels beyond its centre: rays that pass the surface by closer are covered all the
+/// same, and more would spill over the silhouette.
+const REACH_PX: f32 = 0.5;
 
 /// A ray that passes by farther than this says that its mask is wrong, metres.
 const WRONG_M: f32 = 0.25;
@@ -115,7 +116,9 @@ fn passing(field: &Field, rays: &[Rays], samples: &[Sample]) -> Vec<(Sample, Pul
         match rays[view].meet(field, u, v) {
             Meeting::Closest { z } => {
                 let point = rays[view].point(u, v, z);
-                Some((*sample, Pull { point, target: INSIDE_M, wish: Wish::AtLeast, weight: 1.0 }))
+                let target = -REACH_PX * rays[view].footprint(z);
+                let pull = Pull { point, target, wish: Wish::AtLeast, weight: 1.0 };
+                (field.sample(point) < target).then_some((*sample, pull))
             }
             // Outside the grid nothing can be raised.
             Meeting::Surface(_) | Meeting::Nowhere => None,

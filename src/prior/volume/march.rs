@@ -66,6 +66,11 @@ impl Rays {
         self.origin + z * self.direction(u, v)
     }
 
+    /// Width of a pixel at planar depth z, metres.
+    pub(super) fn footprint(&self, z: f32) -> f32 {
+        z / self.intrinsics.fx.min(self.intrinsics.fy) as f32
+    }
+
     /// The first point of a pixel's ray inside the field.
     pub(super) fn meet(&self, field: &Field, u: usize, v: usize) -> Meeting {
         meet(field, self.origin, self.direction(u, v))
