@@ -25,7 +25,7 @@ fn excess(scene: &Scene, geometry: &Geometry, i: usize) -> Vec<f32> {
 }
 
 #[test]
-fn every_mask_pixel_has_depth_and_the_hull_lies_in_front_of_the_surface_but_near_it() {
+fn every_mask_pixel_has_depth_near_the_surface() {
     let scene = right_side(320, 240);
     let geometry = estimate(&without_depth(scene.clone()), None);
     for i in 0..scene.views.len() {
@@ -35,10 +35,10 @@ fn every_mask_pixel_has_depth_and_the_hull_lies_in_front_of_the_surface_but_near
         }
         let excess = excess(&scene, &geometry, i);
         let mean = excess.iter().sum::<f32>() / excess.len() as f32;
-        let behind = excess.iter().filter(|e| **e > 0.06).count() as f32 / excess.len() as f32;
-        assert!((-0.2..0.02).contains(&mean), "view {i}: mean {mean}");
-        // At the rim the hull touches the surface and a voxel may be missing.
-        assert!(behind < 0.03, "view {i}: {behind} behind the surface");
+        assert!((-0.2..0.05).contains(&mean), "view {i}: mean {mean}");
+        // The surface is drawn in by 5 cm, which shows as more where it is seen at a slant.
+        let behind = excess.iter().filter(|e| **e > 0.2).count() as f32 / excess.len() as f32;
+        assert!(behind < 0.05, "view {i}: {behind} far behind the surface");
     }
 }
 
@@ -128,4 +128,42 @@ fn silhouettes_that_meet_nowhere_are_an_error_that_says_what_to_check() {
     let error = reconstruct(&scene, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap_err();
     let text = error.to_string();
     assert!(text.contains("silhouettes") && text.contains("poses"), "{text}");
+}
+
+#[test]
+fn measured_points_correct_the_hull_and_those_elsewhere_are_counted() {
+    let scene = right_side(320, 240);
+    let error = |geometry: &Geometry| -> f32 {
+        let all: Vec<f32> = (0..4).flat_map(|i| excess(&scene, geometry, i)).map(f32::abs).collect();
+        all.iter().sum::<f32>() / all.len() as f32
+    };
+    let views = without_depth(scene.clone());
+    // Points of the true ellipsoid's right side, and some of the road.
+    let on_surface = |i: usize| {
+        let (s, c) = (std::f64::consts::PI * (i as f64 * 0.618_034).fract()).sin_cos();
+        let z = -0.9 + 1.8 * (i as f64 + 0.5) / 400.0;
+        let r = (1.0 - z * z).sqrt();
+        [HALF.x * r * c, -HALF.y * r * s, HALF.z * z].map(|v| v as f32)
+    };
+    let mut points: Vec<[f32; 3]> = (0..400).map(on_surface).collect();
+    points.extend((0..30).map(|i| [i as f32 - 15.0, -4.0, -0.7]));
+    let with = Scene { cloud: Some(vg::scene::Cloud::new(points).unwrap()), ..views.clone() };
+    let threads = Threads::new(2).unwrap();
+    let mut proceed = |_| ControlFlow::Continue(());
+    let context = Context::new(&threads, &mut proceed);
+    let of = |scene: &Scene| {
+        HullPrior { size: None, cloud: scene.cloud.clone() }.estimate(&scene.views, &context).unwrap()
+    };
+    let (corrected, plain) = (of(&with), of(&views));
+    assert!(error(&corrected) < 0.6 * error(&plain), "{} {}", error(&corrected), error(&plain));
+    let fit = corrected.points.unwrap();
+    assert!(fit.outside >= 30 && fit.used + fit.outside == 430 && fit.after_m < 0.01, "{fit:?}");
+
+    let report = run(&with, None).report;
+    assert_eq!(report.cloud, Some(fit));
+    assert!(report.left_out.iter().any(|l| l.what == "points" && l.count == fit.outside));
+    // Given depth needs no points, and says so.
+    let given = Scene { cloud: with.cloud, ..scene.clone() };
+    let made = reconstruct(&given, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap();
+    assert!(made.report.left_out.iter().any(|l| l.what == "points" && l.count == 430));
 }

@@ -57,13 +57,15 @@ impl DepthPrior for HullPrior {
         let hull = context.parallel(|| carve(&silhouettes, &vehicle_box));
         context.report("prior", 0.5)?;
         let mut field = hull.clone();
-        let points = context.parallel(|| {
+        let masks = context.parallel(|| {
             field.smooth(SMOOTHING_M);
             field.adjust(|_, inside| inside - INSET_M);
-            self.cloud.as_ref().map(|cloud| fit_points(&mut field, Some(&hull), cloud.points()))
+            fill_masks(&mut field, Some(&hull), views)
         });
         context.report("prior", 0.55)?;
-        let masks = context.parallel(|| fill_masks(&mut field, Some(&hull), views));
+        // Last: where both speak, a measurement is worth more than what a mask demands at least.
+        let points =
+            context.parallel(|| self.cloud.as_ref().map(|c| fit_points(&mut field, Some(&hull), c.points())));
         context.report("prior", 0.6)?;
         let mut depths = Vec::with_capacity(views.len());
         for (i, view) in views.iter().enumerate() {

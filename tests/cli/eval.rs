@@ -78,3 +78,55 @@ fn splits_that_make_no_sense_are_errors() {
     fail(at, "eval . --only sideways", 1, &["sideways", "right_to_left"]);
     fail(at, "eval . --split {}/missing.json", 1, &["missing.json"]);
 }
+
+#[test]
+fn a_cloud_moves_the_surface_to_it_and_is_found_in_the_scene_s_folder() {
+    let folder = copy_of_sample(&["images", "masks", "depth", "split.json", "transforms.json"]);
+    let at = folder.path();
+    // Every point of what the input views see, as a scan.
+    succeed(
+        at,
+        &format!("reconstruct . --views {INPUTS} --prior given -o {{}}/g.ply --points {{}}/scan.ply"),
+    );
+    let input_depth = |options: &str| {
+        succeed(at, &format!("eval {{}} --prior hull --json {{}}/e.json {options}"));
+        let row = json(&at.join("e.json"))["splits"][0].clone();
+        assert!(row["input_depth_p90_m"].as_f64() > row["input_depth_mae_m"].as_f64(), "{row}");
+        row["input_depth_mae_m"].as_f64().unwrap()
+    };
+    let (without, few, all) =
+        (input_depth(""), input_depth("--cloud scan.ply --cloud-points 50"), input_depth("--cloud scan.ply"));
+    assert!(few < 0.95 * without && all < 0.7 * without, "{without} {few} {all}");
+}
+
+#[test]
+fn depth_in_the_inputs_is_shown_where_there_is_some() {
+    let heading = |prior: &str| {
+        let out = succeed(Path::new("."), &format!("eval . --prior {prior}")).out;
+        out.lines().next().unwrap().to_owned()
+    };
+    assert!(heading("hull").contains("in. depth MAE m     p90"), "{}", heading("hull"));
+    assert!(!heading("given").contains("p90"));
+}
+
+#[test]
+fn clouds_that_make_no_sense_are_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let header = |n: usize| {
+        format!(
+            "ply\nformat binary_little_endian 1.0\nelement vertex {n}\nproperty float x\nproperty float y\n\
+             property float z\nend_header\n"
+        )
+    };
+    let nan = [header(1).as_bytes(), &f32::NAN.to_le_bytes().repeat(3)].concat();
+    fs::write(at.join("nan.ply"), nan).unwrap();
+    fs::write(at.join("empty.ply"), header(0)).unwrap();
+    fail(at, "eval . --prior hull --cloud {}/missing.ply", 1, &["missing.ply"]);
+    fail(at, "eval . --prior hull --cloud {}/nan.ply", 1, &["nan.ply", "x"]);
+    fail(at, "eval . --prior hull --cloud {}/empty.ply", 1, &["empty.ply", "0 points", "1 to 10000000"]);
+    fail(at, "eval . --prior hull --cloud-points 5", 2, &["--cloud"]);
+    fail(at, "eval . --cloud {}/nan.ply --cloud-points 0", 2, &["cloud-points"]);
+    fail(at, "reconstruct . -o {}/a.ply --prior hull --cloud {}/empty.ply", 1, &["empty.ply"]);
+    fail(at, "reconstruct . -o {}/nan.ply --prior hull --cloud {}/nan.ply", 1, &["would be replaced"]);
+}
