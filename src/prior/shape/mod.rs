@@ -5,8 +5,8 @@
 //! a coarse lattice over half the vehicle ([`lattice`]) into signed distance to the vehicle's surface, with an
 //! uncertainty. It is one surface for all views and their mirrored twins: nothing has to be fused. Where the network
 //! is unsure the surface stays nearer to the hull, and nowhere it leaves the hull. Then it moves to where the
-//! photographs agree ([`super::photo`]) and to measured points, where there are some, and at last it yields where
-//! masks are not filled.
+//! photographs agree ([`super::photo`]), it yields where masks are not filled, and at last it moves to measured points,
+//! where there are some.
 
 pub mod lattice;
 mod network;
@@ -74,11 +74,10 @@ impl DepthPrior for ShapePrior {
             false => None,
         };
         context.report("prior", 0.7)?;
-        let points = self
-            .cloud
-            .as_ref()
-            .map(|cloud| context.parallel(|| fit_points(&mut field, Some(&hull), cloud.points())));
         let masks = context.parallel(|| fill_masks(&mut field, Some(&hull), views));
+        // Last: where both speak, a measurement is worth more than what a mask demands at least.
+        let points =
+            context.parallel(|| self.cloud.as_ref().map(|c| fit_points(&mut field, Some(&hull), c.points())));
         context.report("prior", 0.8)?;
         let mut depths = Vec::with_capacity(views.len());
         for (i, view) in views.iter().enumerate() {

@@ -157,9 +157,10 @@ fn passing(field: &Field, rays: &[Rays], samples: &[Sample]) -> Vec<(Sample, Pul
         match rays[view].meet(field, u, v) {
             Meeting::Closest { z } => {
                 let point = rays[view].point(u, v, z);
-                let target = -REACH_PX * rays[view].footprint(z);
-                let pull = Pull { point, target, wish: Wish::AtLeast, weight: 1.0 };
-                (field.sample(point) < target).then_some((*sample, pull))
+                let reach = REACH_PX * rays[view].footprint(z);
+                // A little more than needed: the membrane gives way between the pulls.
+                let pull = Pull { point, target: -0.7 * reach, wish: Wish::AtLeast, weight: 1.0 };
+                (field.sample(point) < -reach).then_some((*sample, pull))
             }
             // Outside the grid nothing can be raised.
             Meeting::Surface(_) | Meeting::Nowhere => None,
