@@ -19,12 +19,12 @@ def test_the_unseen_side_of_the_sample_looks_like_its_photographs(
         views = zip(unseen.cameras, unseen.images, unseen.masks, strict=True)
         return float(np.mean([psnr(gaussians.render(c), on_white(i, m)) for c, i, m in views]))
 
-    # README: 24.29 dB with the scene's depth, 22.73 dB from silhouettes; a little more with relighting.
+    # 24.3 dB with the scene's depth, 24.6 dB from silhouettes with the shape prior.
     assert len(unseen.images) == len(UNSEEN)
     assert mean_psnr(sedan_made.gaussians) > 24.0
     shape = vg.reconstruct(sedan.images, sedan.masks, sedan.cameras)
     assert shape.report["prior"] == "shape"
-    assert mean_psnr(shape.gaussians) > 22.4
+    assert mean_psnr(shape.gaussians) > 24.2
 
 
 def test_the_report_is_a_dict_with_the_names_of_the_views(sedan_made: vg.Reconstruction) -> None:
