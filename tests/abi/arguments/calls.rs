@@ -824,12 +824,26 @@ pub const CALLS: [fn(&World) -> Call; 31] = [
     scene_get_view,
 ];
 
+/// `sizeof` in the release that introduced them: no caller has shorter ones.
+pub const FIRST_SIZES: [(&str, usize); 9] = [
+    ("vg_context_options", 16),
+    ("vg_camera", 280),
+    ("vg_view", 392),
+    ("vg_options", 96),
+    ("vg_report_figures", 152),
+    ("vg_gaussian_arrays", 64),
+    ("vg_render_options", 72),
+    ("vg_image_target", 56),
+    ("vg_scene_options", 72),
+];
+
 fn init(function: &'static str, invoke: Invoke, name: &'static str, target: Lent) -> Call {
     let size = target.stride as u64;
+    let first = FIRST_SIZES.iter().find(|(of, _)| *of == target.of).expect("a struct that says its size").1;
     let mut call = Call::new(function, invoke)
         .argument(name, Value::OutStruct(Lent { bytes: vec![CANARY; target.stride], ..target }))
         .argument("size", Value::Number(size))
-        .tries(counts(&[0, 1, size - 1, 4097, usize::MAX as u64]));
+        .tries(counts(&[0, 1, first as u64 - 1, 4097, usize::MAX as u64]));
     call.has_error = false;
     call
 }
