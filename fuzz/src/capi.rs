@@ -266,6 +266,16 @@ fn field<S: Source>(world: &World, call: &mut Call, i: usize, source: &mut S) {
                 put(lent, 0);
             }
         }
+        "cloud" => {
+            let points: Vec<f32> = (0..9).map(|_| source.pick(&FLOATS)).collect();
+            let mut memory = Memory::of(&points, 0);
+            put(lent, memory.pointer() as u64);
+            call.inputs.push(memory);
+            let Value::Struct(lent) = &mut call.arguments[i].value else { return };
+            lent.put_in(element, "cloud_count", 0, source.below(4) as u64);
+        }
+        // Of a cloud that may not be there.
+        "cloud_count" => put(lent, source.pick(&[0, 10_000_001, 1 << 60, u64::MAX])),
         "name_count" => put(lent, source.pick(&[0, 1, 2, 4097, u64::MAX])),
         "count" if lent.of == "vg_gaussian_arrays" => {
             put(lent, source.pick(&[0, 1, 2, 3, 1 << 31, u64::MAX]))

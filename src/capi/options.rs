@@ -6,6 +6,9 @@ use super::read::{self, Versioned};
 use super::status::{c_string, one_line, vg_status};
 use crate::error::{Error, Result};
 use crate::pipeline::{Calibrate, Keep, Options, PriorChoice};
+use crate::relight::Relight;
+use crate::scene::Cloud;
+use crate::scene::cloud::MAX_CLOUD_POINTS;
 use crate::symmetry::SymmetryMode;
 use std::ffi::{CString, c_char, c_void};
 
@@ -13,7 +16,7 @@ use std::ffi::{CString, c_char, c_void};
 #[repr(i32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum vg_prior {
-    /// `VG_PRIOR_GIVEN` if every used view has depth, else `VG_PRIOR_HULL`.
+    /// `VG_PRIOR_GIVEN` if every used view has depth, else `VG_PRIOR_SHAPE`.
     Auto = 0,
     /// The depth in the views.
     Given = 1,
@@ -21,6 +24,18 @@ pub enum vg_prior {
     Hull = 2,
     /// A network run by ONNX Runtime. `VG_STATUS_NOT_BUILT` in a build without it.
     Onnx = 3,
+    /// The hull, corrected by what vehicles look like; needs masks and nothing else.
+    Shape = 4,
+}
+
+/// Whether cameras and the plane of symmetry are corrected before anything else.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum vg_calibrate {
+    /// Where the silhouettes do not agree, and agree better with the correction.
+    Auto = 0,
+    /// The cameras are taken as they are.
+    Off = 1,
 }
 
 /// How the side that was not photographed is completed across the plane y = 0.
@@ -33,6 +48,16 @@ pub enum vg_symmetry {
     Always = 1,
     /// Nothing is mirrored.
     Never = 2,
+}
+
+/// Whether mirror images are shown in the light of their own side.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum vg_relight {
+    /// As far as the light can be told from what was seen.
+    Auto = 0,
+    /// They keep the light of the side that was seen.
+    Never = 1,
 }
 
 /// What may not be left out although the scene does not need it; bits of `vg_options.keep`.
@@ -104,6 +129,24 @@ pub struct vg_options {
     pub log: vg_log_fn,
     /// Handed to `log`.
     pub log_user: *mut c_void,
+    /// A `vg_calibrate`. Default `VG_CALIBRATE_AUTO`.
+    pub calibrate: i32,
+    /// A `vg_relight`. Default `VG_RELIGHT_AUTO`.
+    pub relight: i32,
+    /// 1: `VG_PRIOR_SHAPE` moves its surface to where the photographs agree; 0: it does not. Default 1.
+    pub photo: i32,
+    /// Reserved: 0.
+    pub flags: u32,
+    /// Seconds the call may take, above 0, where that matters: what is left out is then chosen to fit. 0: as long as
+    /// it takes. Default 0.
+    pub budget_s: f64,
+    /// Points measured on the vehicle, by LiDAR for one: float32 `[cloud_count][3]` without gaps, metres, vehicle
+    /// frame, in any order, all finite; some may be wrong or show something else. `VG_PRIOR_SHAPE` and
+    /// `VG_PRIOR_HULL` bend their surface to them; `VG_PRIOR_GIVEN` leaves them out. Copied during the call. Default
+    /// NULL: none.
+    pub cloud: *const f32,
+    /// How many points, at most 10000000; 0: none. Default 0.
+    pub cloud_count: usize,
 }
 
 unsafe impl Versioned for vg_options {
@@ -125,6 +168,13 @@ unsafe impl Versioned for vg_options {
             progress_user: std::ptr::null_mut(),
             log: None,
             log_user: std::ptr::null_mut(),
+            calibrate: vg_calibrate::Auto as i32,
+            relight: vg_relight::Auto as i32,
+            photo: 1,
+            flags: 0,
+            budget_s: 0.0,
+            cloud: std::ptr::null(),
+            cloud_count: 0,
         }
     }
 }
@@ -136,17 +186,27 @@ impl vg_options {
             (vg_prior::Given as i32, "given", Some(PriorChoice::Given)),
             (vg_prior::Hull as i32, "hull", Some(PriorChoice::Hull)),
             (vg_prior::Onnx as i32, "onnx", None),
+            (vg_prior::Shape as i32, "shape", Some(PriorChoice::Shape)),
         ];
         let prior = read::choice("options.prior", self.prior, &priors)?.ok_or_else(|| Error::NotBuilt {
             argument: "options.prior".into(),
             found: "onnx".into(),
-            remedy: "this version has auto, given and hull".into(),
+            remedy: "this version has auto, given, hull and shape".into(),
         })?;
         let symmetries = [
             (vg_symmetry::Auto as i32, "auto", SymmetryMode::Auto),
             (vg_symmetry::Always as i32, "always", SymmetryMode::Always),
             (vg_symmetry::Never as i32, "never", SymmetryMode::Never),
         ];
+        let calibrations = [
+            (vg_calibrate::Auto as i32, "auto", Calibrate::Auto),
+            (vg_calibrate::Off as i32, "off", Calibrate::Off),
+        ];
+        let relightings = [
+            (vg_relight::Auto as i32, "auto", Relight::Auto),
+            (vg_relight::Never as i32, "never", Relight::Never),
+        ];
+        read::zero("options.flags", self.flags == 0)?;
         let unknown_size = self.vehicle_size == [0.0; 3];
         Ok(Options {
             prior,
@@ -154,15 +214,28 @@ impl vg_options {
             vehicle_size: (!unknown_size).then_some(self.vehicle_size),
             sh_degree: sh_degree("options.sh_degree", self.sh_degree)?,
             keep: keep(self.keep)?,
-            calibrate: Calibrate::default(),
+            calibrate: read::choice("options.calibrate", self.calibrate, &calibrations)?,
+            relight: read::choice("options.relight", self.relight, &relightings)?,
             check: read::flag("options.check", self.check)?,
-            photo: true,
-            budget_s: None,
+            photo: read::flag("options.photo", self.photo)?,
+            budget_s: (self.budget_s != 0.0).then_some(self.budget_s),
             points: read::flag("options.points", self.points)?,
-            // Not in the C options yet.
-            relight: Default::default(),
             threads: 0,
         })
+    }
+
+    /// A copy of the measured points.
+    pub(super) unsafe fn to_cloud(self) -> Result<Option<Cloud>> {
+        if self.cloud_count > MAX_CLOUD_POINTS {
+            let allowed = format!("0 to {MAX_CLOUD_POINTS}");
+            return Err(Error::argument("options.cloud_count", self.cloud_count.to_string(), allowed));
+        }
+        let numbers = unsafe { read::numbers("options.cloud", self.cloud, 3 * self.cloud_count)? };
+        let (points, _) = numbers.as_chunks::<3>();
+        if points.is_empty() {
+            return Ok(None);
+        }
+        Cloud::new(points.to_vec()).map(Some).map_err(|e| read::renamed(e, &[("cloud", "options.cloud")]))
     }
 }
 

@@ -39,7 +39,8 @@ pub unsafe extern "C" fn vg_reconstruct(
             read::not_null("out_gaussians", out_gaussians, "where to put the Gaussians")?;
             let options = read::optional("options", options)?;
             let settings = options.to_options()?;
-            let scene = view::scene(views, view_count)?;
+            let mut scene = view::scene(views, view_count)?;
+            scene.cloud = options.to_cloud()?;
             let made = in_context(options.context, |shop| run(shop, &scene, &settings, &options))?;
             // Nothing can fail any more once the first handle is out.
             let report = (!out_report.is_null()).then(|| ReportObject::new(made.report, made.points));

@@ -4,6 +4,7 @@ use super::guard::{free, guarded, guarded_value};
 use super::options::vg_prior;
 use super::read::{self, Versioned};
 use super::status::{c_string, vg_error, vg_status};
+use crate::calibrate::Verdict;
 use crate::pipeline::{PointCloud, Report};
 use std::ffi::{CString, c_char};
 
@@ -34,6 +35,20 @@ impl ReportObject {
 
 unsafe fn object<'a>(report: *const vg_report) -> Option<&'a ReportObject> {
     unsafe { report.cast::<ReportObject>().as_ref() }
+}
+
+/// What became of the correction of the cameras.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum vg_calibration {
+    /// None was looked for: it was switched off, or these views cannot be calibrated.
+    None = 0,
+    /// The silhouettes agree already.
+    NotNeeded = 1,
+    /// The cameras were moved.
+    Accepted = 2,
+    /// A correction was estimated and thrown away.
+    Refused = 3,
 }
 
 /// The main figures of a report.
@@ -73,6 +88,25 @@ pub struct vg_report_figures {
     pub extent_low: [f64; 3],
     /// Highest corner of the Gaussians' centres, metres.
     pub extent_high: [f64; 3],
+    /// Mirror images that were shown in the light of their own side.
+    pub relit_count: u64,
+    /// Points of the cloud that the prior's surface was moved to.
+    pub cloud_used: u64,
+    /// Places that the photographs agree on, to which the prior's surface was moved.
+    pub photo_found: u64,
+    /// A `vg_calibration`.
+    pub calibration: i32,
+    /// 1 if `uncovered_before` and `uncovered_after` hold what the prior's surface left open of the masks.
+    pub has_uncovered: i32,
+    /// Rotation about z that brings the plane of symmetry that was found onto y = 0, degrees; of a refused
+    /// correction, what was refused.
+    pub calibration_yaw_degrees: f64,
+    /// Shift along y that does, metres.
+    pub calibration_lateral_m: f64,
+    /// Part of the vehicle's pixels that the prior's surface did not cover, 0 to 1.
+    pub uncovered_before: f64,
+    /// The same after the surface was raised to meet them.
+    pub uncovered_after: f64,
 }
 
 unsafe impl Versioned for vg_report_figures {
@@ -97,6 +131,15 @@ unsafe impl Versioned for vg_report_figures {
             box_size: [0.0; 3],
             extent_low: [0.0; 3],
             extent_high: [0.0; 3],
+            relit_count: 0,
+            cloud_used: 0,
+            photo_found: 0,
+            calibration: vg_calibration::None as i32,
+            has_uncovered: 0,
+            calibration_yaw_degrees: 0.0,
+            calibration_lateral_m: 0.0,
+            uncovered_before: 0.0,
+            uncovered_after: 0.0,
         }
     }
 }
@@ -106,7 +149,14 @@ impl vg_report_figures {
         let prior = match report.prior {
             "given" => vg_prior::Given,
             "hull" => vg_prior::Hull,
+            "shape" => vg_prior::Shape,
             _ => vg_prior::Auto,
+        };
+        let calibration = match report.calibration.as_ref().map(|c| c.verdict) {
+            None => vg_calibration::None,
+            Some(Verdict::NotNeeded) => vg_calibration::NotNeeded,
+            Some(Verdict::Accepted) => vg_calibration::Accepted,
+            Some(Verdict::Refused) => vg_calibration::Refused,
         };
         let (low, high) = report.extent_m.unwrap_or_default();
         Self {
@@ -125,6 +175,15 @@ impl vg_report_figures {
             box_size: report.vehicle_box.map_or([0.0; 3], |b| b.size_m),
             extent_low: low.map(f64::from),
             extent_high: high.map(f64::from),
+            relit_count: report.relight.map_or(0, |r| r.clones as u64),
+            cloud_used: report.cloud.map_or(0, |c| c.used as u64),
+            photo_found: report.photo.map_or(0, |p| p.found as u64),
+            calibration: calibration as i32,
+            has_uncovered: i32::from(report.masks.is_some()),
+            calibration_yaw_degrees: report.calibration.as_ref().map_or(0.0, |c| c.yaw_degrees),
+            calibration_lateral_m: report.calibration.as_ref().map_or(0.0, |c| c.lateral_m),
+            uncovered_before: report.masks.map_or(0.0, |m| m.uncovered_before),
+            uncovered_after: report.masks.map_or(0.0, |m| m.uncovered_after),
             ..Self::initial()
         }
     }

@@ -47,7 +47,7 @@ fn layout_of_rust() -> String {
         }
         vg_options {
             struct_size context prior symmetry sh_degree keep check points vehicle_size progress progress_user log
-            log_user
+            log_user calibrate relight photo flags budget_s cloud cloud_count
         }
         vg_render_options {
             struct_size context backend background background_color alpha depth_mode sh_degree antialiased blur
@@ -55,7 +55,9 @@ fn layout_of_rust() -> String {
         }
         vg_report_figures {
             struct_size gaussian_count mirrored_count views_used threads prior sh_degree total_ms peak_rss_bytes
-            has_input_error has_box input_psnr_db input_silhouette_iou box_size extent_low extent_high
+            has_input_error has_box input_psnr_db input_silhouette_iou box_size extent_low extent_high relit_count
+            cloud_used photo_found calibration has_uncovered calibration_yaw_degrees calibration_lateral_m
+            uncovered_before uncovered_after
         }
         vg_scene_options {
             struct_size context vehicle_from_world names name_count depth_scale load_depth flags log log_user
@@ -92,12 +94,15 @@ fn numbers_of_rust() -> BTreeSet<String> {
         vg_alpha { Straight Premultiplied }
         vg_backend { Auto Cpu Gpu }
         vg_background { Color Transparent }
+        vg_calibrate { Auto Off }
+        vg_calibration { None NotNeeded Accepted Refused }
         vg_camera_model { SimplePinhole Pinhole SimpleRadial Radial Opencv OpencvFisheye FullOpencv }
         vg_depth_mode { Expected Accumulated }
         vg_format { Rgb8 Bgr8 Rgba8 Bgra8 Gray8 Rgba32f Depth32f }
         vg_keep { DuplicateViews Overlap SilhouetteEdge Floaters ShBands }
         vg_log_level { Warning Info Debug }
-        vg_prior { Auto Given Hull Onnx }
+        vg_prior { Auto Given Hull Onnx Shape }
+        vg_relight { Auto Never }
         vg_status { Ok Argument Format Io Reconstruction Cancelled NotBuilt Internal }
         vg_symmetry { Auto Always Never }
     }

@@ -25,7 +25,7 @@ pub struct vg_view {
     /// read in place; anything else is copied once.
     pub image: vg_image,
     /// GRAY8, of the camera's size: 128 and above is vehicle. `data` NULL: the photograph's alpha is the mask; where
-    /// it has none, or one that is 255 throughout, every pixel is vehicle, which the silhouette prior refuses.
+    /// it has none, or one that is 255 throughout, every pixel is vehicle, which the silhouette priors refuse.
     pub mask: vg_image,
     /// DEPTH32F, of the camera's size. `data` NULL: not measured.
     pub depth: vg_image,

@@ -5,7 +5,9 @@
 use crate::common::vehicle;
 use crate::symbols::declared;
 use crate::tools::{root, scratch};
-use calls::{Call, Done, FEW, Made, Memory, Outcome, Value, World, bits32, blank, bytes_of, text};
+use calls::{
+    Call, Done, FEW, FIRST_SIZES, Made, Memory, Outcome, Value, World, bits32, blank, bytes_of, text,
+};
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
 use std::ffi::{CStr, CString, c_char, c_void};
@@ -192,19 +194,6 @@ fn expected(outcome: Outcome, words: String) -> Expect {
 /// Functions that fill a struct as far as it says it goes.
 const SIZED: [&str; 2] = ["vg_report_get_figures", "vg_scene_get_view"];
 
-/// `sizeof` in the release that introduced them: no caller has shorter ones.
-const FIRST_SIZES: [(&str, usize); 9] = [
-    ("vg_context_options", 16),
-    ("vg_camera", 280),
-    ("vg_view", 392),
-    ("vg_options", 96),
-    ("vg_report_figures", 152),
-    ("vg_gaussian_arrays", 64),
-    ("vg_render_options", 72),
-    ("vg_image_target", 56),
-    ("vg_scene_options", 72),
-];
-
 /// Functions that cannot fail, all called by `what_cannot_fail_accepts_null`.
 const NEVER_FAIL: [&str; 22] = [
     "vg_version",
@@ -285,7 +274,8 @@ fn init_functions_fill_what_they_are_told_and_nothing_beyond() {
         let Value::OutStruct(lent) = &valid.arguments[0].value else { panic!("a struct") };
         let size = lent.stride;
         let whole = table.row(make, "whole", |_| {}, Fine).memory[0].take().unwrap();
-        for (told, there) in [(size, size + 40), (size + 8, size + 40), (4096, 4096)] {
+        let first = FIRST_SIZES.iter().find(|(of, _)| *of == lent.of).expect("a struct that says its size").1;
+        for (told, there) in [(first, size + 40), (size, size + 40), (size + 8, size + 40), (4096, 4096)] {
             let tell = |call: &mut Call| {
                 call.lent(name).bytes = vec![calls::CANARY; there];
                 call.set("size", Value::Number(told as u64));
@@ -299,8 +289,12 @@ fn init_functions_fill_what_they_are_told_and_nothing_beyond() {
                 let memory = done.memory[0].take().unwrap();
                 let bytes = memory.content();
                 assert_eq!(bytes[..8], told.to_ne_bytes());
-                assert_eq!(bytes[8..size], whole.content()[8..]);
-                assert!(bytes[size..told].iter().all(|&b| b == 0), "what this library does not know is zero");
+                let known = size.min(told);
+                assert_eq!(bytes[8..known], whole.content()[8..known]);
+                assert!(
+                    bytes[known..told].iter().all(|&b| b == 0),
+                    "what this library does not know is zero"
+                );
                 assert!(bytes[told..].iter().all(|&b| b == calls::CANARY), "written beyond {told} bytes");
             }
         }
@@ -1044,7 +1038,7 @@ fn depth_of_a_thousand_metres_is_told_to_the_log_and_nobody_else() {
 #[test]
 fn figures_tell_the_prior_and_its_box() {
     let mut table = Table::new();
-    for (prior, has_box) in [(vg_prior::Given, 0), (vg_prior::Hull, 1)] {
+    for (prior, has_box) in [(vg_prior::Given, 0), (vg_prior::Hull, 1), (vg_prior::Shape, 1)] {
         let choose = |call: &mut Call| call.lent("options").put("prior", 0, prior as u64);
         let made = table.row(calls::reconstruct, "a prior", choose, Fine);
         let mut call = calls::report_get_figures(&table.world);
@@ -1057,7 +1051,127 @@ fn figures_tell_the_prior_and_its_box() {
         assert_eq!((figures.gaussian_count, figures.views_used, figures.threads), (count as u64, 4, 2));
         assert!((0..3).all(|k| figures.extent_low[k] < figures.extent_high[k]));
         assert_eq!((figures.box_size != [0.0; 3]), has_box == 1);
+        assert_eq!(figures.has_uncovered, has_box);
+        assert!(figures.uncovered_after <= figures.uncovered_before && figures.uncovered_before < 1.0);
+        assert_eq!(figures.cloud_used, 0);
+
+        // The report has the same.
+        let told = report(made.handle("out_report"));
+        assert_eq!(figures.photo_found, told["photo"]["found"].as_u64().unwrap_or(0));
+        assert_eq!(figures.relit_count, told["relight"]["clones"].as_u64().unwrap_or(0));
+        let calibration = match told["calibration"]["verdict"].as_str() {
+            None => vg_calibration::None,
+            Some("not-needed") => vg_calibration::NotNeeded,
+            Some("accepted") => vg_calibration::Accepted,
+            Some("refused") => vg_calibration::Refused,
+            Some(other) => panic!("{other}"),
+        };
+        assert_eq!(figures.calibration, calibration as i32);
+        let degrees = told["calibration"]["yaw_degrees"].as_f64().unwrap_or(0.0);
+        assert!((figures.calibration_yaw_degrees - degrees).abs() < 1e-12);
     }
+}
+
+fn report(handle: usize) -> serde_json::Value {
+    let json = unsafe { CStr::from_ptr(vg_report_json(handle as _)) };
+    serde_json::from_str(json.to_str().unwrap()).unwrap()
+}
+
+/// A program of the first header has none of the fields that came later.
+#[test]
+fn options_of_an_older_program_have_the_defaults_of_what_came_later() {
+    let mut table = Table::new();
+    let make = calls::reconstruct;
+    let expected = bytes(table.row(make, "as it is", |_| {}, Fine).handle("out_gaussians"));
+    let first = FIRST_SIZES.iter().find(|(of, _)| *of == "vg_options").unwrap().1;
+    // Up to the reserved field, and to the middle of the cloud.
+    for size in [first, first + 8, first + 12, first + 16, first + 24, first + 36] {
+        let older = |call: &mut Call| {
+            call.lent("options").put("photo", 0, if size > first + 8 { 1 } else { 77 });
+            call.lent("options").resize(size, 0);
+        };
+        let done = table.row(make, &format!("options of {size} bytes"), older, Fine);
+        assert_eq!(bytes(done.handle("out_gaussians")), expected);
+        let settings = &report(done.handle("out_report"))["settings"];
+        assert_eq!(settings["calibrate"], "auto");
+        assert_eq!(settings["relight"], "auto");
+        assert_eq!((settings["photo"].as_bool(), settings["budget_s"].is_null()), (Some(true), true));
+    }
+}
+
+#[test]
+fn options_reach_the_library() {
+    let mut table = Table::new();
+    let set = |call: &mut Call| {
+        for (name, value) in [("calibrate", 1), ("relight", 1), ("photo", 0)] {
+            call.lent("options").put(name, 0, value);
+        }
+        call.lent("options").put("budget_s", 0, 1e6f64.to_bits());
+    };
+    let done = table.row(calls::reconstruct, "nothing as it is", set, Fine);
+    let told = report(done.handle("out_report"));
+    let settings = &told["settings"];
+    assert_eq!((settings["calibrate"].as_str(), settings["relight"].as_str()), (Some("off"), Some("never")));
+    assert_eq!((settings["photo"].as_bool(), settings["budget_s"].as_f64()), (Some(false), Some(1e6)));
+    assert!(told["calibration"].is_null() && told["relight"].is_null());
+}
+
+#[test]
+fn a_cloud_is_read_to_its_last_number_and_copied() {
+    let mut table = Table::new();
+    let make = calls::reconstruct;
+    // Points of the right side, where the depth has them.
+    let points = unsafe {
+        let count = vg_report_point_count(table.world.report as _);
+        std::slice::from_raw_parts(vg_report_point_positions(table.world.report as _), 3 * count)
+    };
+    let points: Vec<f32> = points.chunks_exact(3).step_by(10).flatten().copied().collect();
+    let count = points.len() / 3;
+    assert!(count > 50, "{count} points");
+    let lend = |values: Vec<f32>, count: usize, prior: vg_prior| {
+        move |call: &mut Call| {
+            let mut memory = Memory::of(&values, 0);
+            call.lent("options").put("cloud", 0, memory.pointer() as u64);
+            call.lent("options").put("cloud_count", 0, count as u64);
+            call.lent("options").put("prior", 0, prior as u64);
+            call.inputs.push(memory);
+        }
+    };
+    for prior in [vg_prior::Hull, vg_prior::Shape] {
+        let done = table.row(make, "a cloud", lend(points.clone(), count, prior), Fine);
+        let told = report(done.handle("out_report"));
+        assert!(told["cloud"]["used"].as_u64().unwrap() as usize > count / 2, "{}", told["cloud"]);
+        let mut call = calls::report_get_figures(&table.world);
+        call.set("report", Value::Handle(done.handle("out_report")));
+        let figures = call.run(true);
+        let content = figures.memory[1].as_ref().unwrap().content();
+        let figures = unsafe { content.as_ptr().cast::<vg_report_figures>().read_unaligned() };
+        assert_eq!(Some(figures.cloud_used), told["cloud"]["used"].as_u64());
+    }
+    let given = table.row(make, "a cloud beside depth", lend(points.clone(), count, vg_prior::Given), Fine);
+    let told = report(given.handle("out_report"));
+    assert!(told["cloud"].is_null());
+    assert!(told["left_out"].as_array().unwrap().iter().any(|l| l["count"].as_u64() == Some(count as u64)));
+
+    let none = lend(points.clone(), 0, vg_prior::Given);
+    let told = report(table.row(make, "none of them", none, Fine).handle("out_report"));
+    assert!(told["left_out"].as_array().unwrap().iter().all(|l| l["count"].as_u64() != Some(count as u64)));
+    let nowhere = |call: &mut Call| call.lent("options").put("cloud_count", 0, 2);
+    table.row(make, "no points, but two", nowhere, refused("options.cloud: NULL"));
+    let off = |call: &mut Call| {
+        lend(points.clone(), count - 1, vg_prior::Given)(call);
+        let at = call.inputs.last_mut().unwrap().pointer() as u64 + 2;
+        call.lent("options").put("cloud", 0, at);
+    };
+    table.row(make, "points between floats", off, refused("options.cloud: address"));
+    for (k, bad) in [(0, f32::NAN), (3 * count - 1, f32::INFINITY), (3 * count - 3, f32::NEG_INFINITY)] {
+        let mut spoilt = points.clone();
+        spoilt[k] = bad;
+        let words = refused(&format!("options.cloud[{}]", k / 3));
+        table.row(make, &format!("{bad} among the points"), lend(spoilt, count, vg_prior::Hull), words);
+    }
+    let far = |call: &mut Call| lend(vec![f32::MAX; 9], 3, vg_prior::Hull)(call);
+    table.row(make, "points that are nowhere near", far, Fine);
 }
 
 /// What a callback that calls the library is told.

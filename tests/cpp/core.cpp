@@ -1,8 +1,10 @@
 // vg.hpp without other libraries: results, ownership, callbacks, errors. Prints nothing where all is well.
 //
 //     core SCRATCH_FOLDER
+#include <array>
 #include <csignal>
 #include <cstring>
+#include <limits>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -152,6 +154,24 @@ vg::Reconstruction ball() {
     return made;
 }
 
+void a_cloud_is_lent() {
+    const Photographs photographs;
+    std::vector<std::array<float, 3>> cloud(5, {0.0F, 0.0F, 0.5F});
+    vg::Options options;
+    CHECK(options.cloud == nullptr && options.photo == 1 && options.budget_s == 0);
+    options.lend_cloud(cloud);
+    CHECK(options.cloud == cloud[0].data() && options.cloud_count == 5);
+    // Depth says all: the report tells how many points were not needed.
+    const vg::Reconstruction made = vg::reconstruct({photographs.view()}, options).take();
+    CHECK(std::strstr(made.report.json(), "\"count\": 5") != nullptr);
+    CHECK(made.report.figures().cloud_used == 0);
+    cloud[3][1] = std::numeric_limits<float>::quiet_NaN();
+    CHECK(failed(vg::reconstruct({photographs.view()}, options), VG_STATUS_ARGUMENT, "options.cloud[3]"));
+    cloud.clear();
+    options.lend_cloud(cloud);
+    CHECK(options.cloud == nullptr && options.cloud_count == 0);
+}
+
 void callbacks_stop_a_reconstruction() {
     const Photographs photographs;
     int calls = 0;
@@ -252,6 +272,7 @@ int main(int argc, char **argv) {
     what_is_empty_is_harmless();
     cameras_are_made_moved_scaled_and_cropped();
     callbacks_stop_a_reconstruction();
+    a_cloud_is_lent();
     errors_name_the_argument();
     const vg::Reconstruction made = ball();
     gaussians_are_saved_derived_and_made_of_arrays(made.gaussians, argv[1]);

@@ -39,7 +39,8 @@ pub(crate) fn from_library(py: Python<'_>, error: vg::Error) -> PyErr {
     let message = match error {
         vg::Error::Argument { argument, found, allowed } => {
             let argument = argument.strip_prefix("options.").unwrap_or(&argument);
-            format!("{}; allowed: {allowed}", [&argument.replace("rotations", "quats"), &*found].join(": "))
+            let argument = argument.replace("rotations", "quats").replace("budget_s", "budget");
+            format!("{}; allowed: {allowed}", [&argument, &*found].join(": "))
         }
         other => other.to_string(),
     };

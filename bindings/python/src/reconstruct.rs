@@ -9,11 +9,12 @@ use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 use std::ops::ControlFlow;
-use vg::pipeline::{Keep, Options, PriorChoice};
+use vg::pipeline::{Calibrate, Keep, Options, PriorChoice};
 use vg::progress::Progress;
+use vg::relight::Relight;
 use vg::scene::image::PixelFormat;
 use vg::scene::mask::VEHICLE_THRESHOLD;
-use vg::scene::{DepthMap, Mask, RgbImage};
+use vg::scene::{Cloud, DepthMap, Mask, RgbImage};
 use vg::symmetry::SymmetryMode;
 use vg::{Scene, View};
 
@@ -23,8 +24,8 @@ type Points<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>);
 /// The Gaussians, the report as JSON, and the points if asked for.
 #[pyfunction]
 #[pyo3(signature = (
-    images, masks, cameras, depths, *, prior, symmetry, vehicle_size, sh_degree, keep, check, points, threads, names,
-    progress
+    images, masks, cameras, depths, *, prior, calibrate, symmetry, relight, photo, cloud, vehicle_size, sh_degree, keep,
+    check, points, budget, threads, names, progress
 ))]
 pub(crate) fn reconstruct<'py>(
     py: Python<'py>,
@@ -33,30 +34,39 @@ pub(crate) fn reconstruct<'py>(
     cameras: Vec<Bound<'py, PyAny>>,
     depths: Option<Vec<Bound<'py, PyAny>>>,
     prior: &str,
+    calibrate: &str,
     symmetry: &str,
+    relight: &str,
+    photo: bool,
+    cloud: Option<&Bound<'py, PyAny>>,
     vehicle_size: Option<[f64; 3]>,
     sh_degree: u8,
     keep: Vec<String>,
     check: bool,
     points: bool,
+    budget: Option<f64>,
     threads: usize,
     names: Option<Vec<String>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(Gaussians, String, Option<Points<'py>>)> {
     let options = Options {
         prior: parse_prior(py, prior)?,
+        calibrate: parse_calibrate(py, calibrate)?,
         symmetry: parse_symmetry(py, symmetry)?,
+        relight: parse_relight(py, relight)?,
         vehicle_size,
         sh_degree,
         keep: parse_keep(py, &keep)?,
         check,
+        photo,
+        budget_s: budget,
         threads,
         points,
-        ..Options::default()
     };
     // Before the pixels are copied.
     options.validate().map_err(|e| from_library(py, e))?;
-    let scene = scene_of(py, &images, masks.as_deref(), &cameras, depths.as_deref(), names)?;
+    let mut scene = scene_of(py, &images, masks.as_deref(), &cameras, depths.as_deref(), names)?;
+    scene.cloud = cloud.map_or(Ok(None), self::cloud)?;
 
     let mut raised = None;
     let made = detached(py, || {
@@ -207,6 +217,20 @@ fn depth(object: &Bound<'_, PyAny>, i: usize, camera: &vg::Camera) -> PyResult<D
         .map_err(|e| from_library(py, e))
 }
 
+/// A copy of the points; none if there are none.
+fn cloud(object: &Bound<'_, PyAny>) -> PyResult<Option<Cloud>> {
+    let py = object.py();
+    let points = array::<f32>(object, "cloud", "a NumPy array of float32, metres, (n, 3)")?;
+    if !matches!(points.shape(), [_, 3]) {
+        return Err(bad_value(py, "cloud", &shape_text(points.shape()), "(n, 3)"));
+    }
+    let (points, _) = values(&points)?.as_chunks::<3>();
+    if points.is_empty() {
+        return Ok(None);
+    }
+    Cloud::new(points.to_vec()).map(Some).map_err(|e| from_library(py, e))
+}
+
 fn same_size(py: Python<'_>, argument: &str, shape: &[usize], camera: &vg::Camera) -> PyResult<()> {
     if shape == [camera.height as usize, camera.width as usize] {
         return Ok(());
@@ -230,7 +254,24 @@ fn parse_prior(py: Python<'_>, name: &str) -> PyResult<PriorChoice> {
         "auto" => Ok(PriorChoice::Auto),
         "given" => Ok(PriorChoice::Given),
         "hull" => Ok(PriorChoice::Hull),
-        other => Err(bad_value(py, "prior", &format!("{other:?}"), "auto, given, hull")),
+        "shape" => Ok(PriorChoice::Shape),
+        other => Err(bad_value(py, "prior", &format!("{other:?}"), "auto, given, hull, shape")),
+    }
+}
+
+fn parse_calibrate(py: Python<'_>, name: &str) -> PyResult<Calibrate> {
+    match name {
+        "auto" => Ok(Calibrate::Auto),
+        "off" => Ok(Calibrate::Off),
+        other => Err(bad_value(py, "calibrate", &format!("{other:?}"), "auto, off")),
+    }
+}
+
+fn parse_relight(py: Python<'_>, name: &str) -> PyResult<Relight> {
+    match name {
+        "auto" => Ok(Relight::Auto),
+        "never" => Ok(Relight::Never),
+        other => Err(bad_value(py, "relight", &format!("{other:?}"), "auto, never")),
     }
 }
 

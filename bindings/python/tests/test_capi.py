@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes as ct
 import gc
+import json
 import os
 import re
 import shutil
@@ -28,9 +29,12 @@ ENUMERATIONS = {
     "vg_format": capi.Format,
     "vg_camera_model": capi.CameraModel,
     "vg_prior": capi.Prior,
+    "vg_calibrate": capi.Calibrate,
     "vg_symmetry": capi.Symmetry,
+    "vg_relight": capi.Relight,
     "vg_keep": capi.Keep,
     "vg_log_level": capi.LogLevel,
+    "vg_calibration": capi.Calibration,
     "vg_backend": capi.Backend,
     "vg_background": capi.Background,
     "vg_alpha": capi.Alpha,
@@ -121,6 +125,31 @@ def test_ctypes_and_the_extension_module_give_the_same_bytes(depth: bool, sedan:
             picture_c, z_c = theirs.gaussians.render_with_depth(camera, background, dtype=dtype)
             np.testing.assert_array_equal(picture, picture_c)
             np.testing.assert_array_equal(z, z_c)
+
+
+def test_options_are_those_of_the_extension_module(ellipsoid: Views, made: vg.Reconstruction) -> None:
+    views = (ellipsoid.images, ellipsoid.masks, ellipsoid.cameras)
+    cloud = made.gaussians.means[made.gaussians.means[:, 1] < 0][::10]
+    given: dict[str, Any] = {
+        "prior": "shape",
+        "calibrate": "off",
+        "symmetry": "always",
+        "relight": "never",
+        "photo": False,
+        "cloud": cloud,
+        "check": False,
+        "budget": 1e6,
+    }
+    ours, theirs = vg.reconstruct(*views, **given), capi.reconstruct(*views, **given)
+    assert same_bytes(ours.gaussians, theirs.gaussians)
+    assert ours.report["cloud"] == theirs.report["cloud"] and ours.report["cloud"]["used"] > 0
+    for name in ("prior", "calibrate", "symmetry", "relight", "photo", "check", "budget_s"):
+        assert ours.report["settings"][name] == theirs.report["settings"][name] == given[name.removesuffix("_s")]
+    # Another order in memory is copied; no points are no cloud.
+    given["cloud"] = np.asfortranarray(cloud)
+    assert same_bytes(capi.reconstruct(*views, **given).gaussians, ours.gaussians)
+    given["cloud"] = cloud[:0]
+    assert capi.reconstruct(*views, **given).report["cloud"] is None
 
 
 def test_scenes_opened_through_ctypes_give_the_same_bytes(
@@ -323,8 +352,16 @@ def test_figures_are_those_of_the_report(ellipsoid: Views) -> None:
     figures = capi._initial(capi.vg_report_figures)
     capi._call("vg_report_get_figures", report, ct.byref(figures))
     assert figures.gaussian_count == capi.library.vg_gaussians_count(car)
-    assert (figures.views_used, figures.prior, figures.has_input_error) == (4, capi.Prior.HULL, 1)
+    assert (figures.views_used, figures.prior, figures.has_input_error) == (4, capi.Prior.SHAPE, 1)
     assert 1.5 < figures.extent_high[1] - figures.extent_low[1] < 2.1
+    told = json.loads(capi.library.vg_report_json(report))
+    verdict = None if told["calibration"] is None else told["calibration"]["verdict"]
+    names = {None: "NONE", "not-needed": "NOT_NEEDED", "accepted": "ACCEPTED", "refused": "REFUSED"}
+    assert figures.calibration == capi.Calibration[names[verdict]]
+    assert figures.has_uncovered == (told["masks"] is not None)
+    assert figures.photo_found == (told["photo"] or {"found": 0})["found"]
+    assert figures.relit_count == (told["relight"] or {"clones": 0})["clones"]
+    assert figures.cloud_used == 0
     capi.library.vg_report_free(report)
     capi.library.vg_gaussians_free(car)
 
@@ -340,7 +377,14 @@ def test_errors_have_the_same_codes_and_texts(ellipsoid: Views, tmp_path: Path) 
     with pytest.raises(TypeError, match="^camera: ndarray"):
         capi.reconstruct(ellipsoid.images[:1], None, [np.eye(4)])
     refused: list[tuple[dict[str, Any], str]] = [
-        ({"prior": "best"}, "prior: 'best'; allowed: auto, given, hull, onnx"),
+        ({"prior": "best"}, "prior: 'best'; allowed: auto, given, hull, onnx, shape"),
+        ({"calibrate": "yes"}, "calibrate: 'yes'; allowed: auto, off"),
+        ({"relight": "yes"}, "relight: 'yes'; allowed: auto, never"),
+        ({"photo": 2}, "options.photo: 2; allowed: 0 (no), 1 (yes)"),
+        ({"budget": 0}, "budget: 0; allowed: seconds above 0"),
+        ({"budget": -1}, "options.budget_s: -1"),
+        ({"cloud": np.zeros((4, 2), np.float32)}, "cloud: shape (4, 2); allowed: (n, 3)"),
+        ({"cloud": np.full((4, 3), np.nan, np.float32)}, "options.cloud[0]: [NaN, NaN, NaN]; allowed: finite"),
         ({"masks": []}, "masks: 0 entries; allowed: 4, one per image"),
         ({"sh_degree": 4}, "options.sh_degree: 4"),
         ({"masks": [np.zeros((5, 5), np.uint8)] * 4}, "views[0] (000).mask: 5x5"),

@@ -112,7 +112,15 @@ def test_lists_are_equally_long_and_not_empty(ellipsoid: Views) -> None:
 
 
 OPTIONS: list[tuple[dict[str, Any], str]] = [
-    ({"prior": "best"}, 'prior: "best"; allowed: auto, given, hull'),
+    ({"prior": "best"}, 'prior: "best"; allowed: auto, given, hull, shape'),
+    ({"calibrate": "yes"}, 'calibrate: "yes"; allowed: auto, off'),
+    ({"relight": "always"}, 'relight: "always"; allowed: auto, never'),
+    ({"budget": 0}, "budget: 0; allowed: seconds above 0"),
+    ({"budget": -1.5}, "budget: -1.5; allowed: seconds above 0"),
+    ({"budget": float("inf")}, "budget: inf; allowed: seconds above 0"),
+    ({"cloud": np.zeros((4, 2), np.float32)}, "cloud: shape (4, 2); allowed: (n, 3)"),
+    ({"cloud": np.zeros(3, np.float32)}, "cloud: shape (3,); allowed: (n, 3)"),
+    ({"cloud": np.array([[0, 0, 0], [0, np.inf, 0]], np.float32)}, "cloud[1]: [0.0, inf, 0.0]; allowed: finite"),
     ({"symmetry": "yes"}, 'symmetry: "yes"; allowed: auto, always, never'),
     ({"keep": ["roof"]}, 'keep: "roof"; allowed: duplicate-views'),
     ({"sh_degree": 4}, "sh_degree: 4; allowed: 0 to 3"),
@@ -129,6 +137,12 @@ def test_a_wrong_option_is_named_as_in_the_call(options: dict[str, Any], message
     with pytest.raises(vg.VgError, match="^" + re.escape(message)) as caught:
         vg.reconstruct(ellipsoid.images, ellipsoid.masks, ellipsoid.cameras, **options)
     assert caught.value.code is Status.ARGUMENT
+
+
+def test_a_cloud_of_doubles_is_a_type_error(ellipsoid: Views) -> None:
+    for cloud, found in ((np.zeros((4, 3)), "array of float64"), ([[0.0, 0.0, 0.0]], "list"), ("lidar.ply", "str")):
+        with pytest.raises(TypeError, match=f"^cloud: {found}; allowed: a NumPy array of float32"):
+            vg.reconstruct(ellipsoid.images, ellipsoid.masks, ellipsoid.cameras, cloud=cloud)  # type: ignore[arg-type]
 
 
 def test_a_vehicle_that_cannot_be_made_says_why(ellipsoid: Views) -> None:

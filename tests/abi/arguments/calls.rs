@@ -127,6 +127,15 @@ fn finite() -> Tries {
     [f64::NAN, f64::INFINITY, f64::NEG_INFINITY].map(|v| (v.to_bits(), Refused)).to_vec()
 }
 
+/// Seconds, 0 for none.
+fn budget() -> Tries {
+    let good = [0.0f64, -0.0, 1e6].map(|v| (v.to_bits(), Fine));
+    good.into_iter()
+        .chain([(-1.0f64).to_bits(), (-5e-324f64).to_bits()].map(|b| (b, Refused)))
+        .chain(finite())
+        .collect()
+}
+
 fn sizes() -> Tries {
     [0, 8193, 1 << 31, u32::MAX].map(|v| (u64::from(v), Refused)).to_vec()
 }
@@ -815,12 +824,26 @@ pub const CALLS: [fn(&World) -> Call; 31] = [
     scene_get_view,
 ];
 
+/// `sizeof` in the release that introduced them: no caller has shorter ones.
+pub const FIRST_SIZES: [(&str, usize); 9] = [
+    ("vg_context_options", 16),
+    ("vg_camera", 280),
+    ("vg_view", 392),
+    ("vg_options", 96),
+    ("vg_report_figures", 152),
+    ("vg_gaussian_arrays", 64),
+    ("vg_render_options", 72),
+    ("vg_image_target", 56),
+    ("vg_scene_options", 72),
+];
+
 fn init(function: &'static str, invoke: Invoke, name: &'static str, target: Lent) -> Call {
     let size = target.stride as u64;
+    let first = FIRST_SIZES.iter().find(|(of, _)| *of == target.of).expect("a struct that says its size").1;
     let mut call = Call::new(function, invoke)
         .argument(name, Value::OutStruct(Lent { bytes: vec![CANARY; target.stride], ..target }))
         .argument("size", Value::Number(size))
-        .tries(counts(&[0, 1, size - 1, 4097, usize::MAX as u64]));
+        .tries(counts(&[0, 1, first as u64 - 1, 4097, usize::MAX as u64]));
     call.has_error = false;
     call
 }
@@ -993,6 +1016,15 @@ fn figures() -> Lent {
         box_size[3]: elsewhere(),
         extent_low[3]: elsewhere(),
         extent_high[3]: elsewhere(),
+        relit_count: elsewhere(),
+        cloud_used: elsewhere(),
+        photo_found: elsewhere(),
+        calibration: elsewhere(),
+        has_uncovered: elsewhere(),
+        calibration_yaw_degrees: elsewhere(),
+        calibration_lateral_m: elsewhere(),
+        uncovered_before: elsewhere(),
+        uncovered_after: elsewhere(),
     });
     Lent::zeroed::<vg_report_figures>("vg_report_figures", fields)
 }
@@ -1085,7 +1117,7 @@ fn options(context: usize) -> Lent {
     let fields = fields!(vg_options {
         struct_size: elsewhere(),
         context: elsewhere(),
-        prior: choice_without(&[0, 1, 2], 3),
+        prior: choice_without(&[0, 1, 2, 4], 3),
         symmetry: choice(&[0, 1, 2]),
         sh_degree: choice(&[0, 1, 2, 3]),
         keep: vec![(31, Fine), (32, Refused), (u64::from(u32::MAX), Refused)],
@@ -1096,11 +1128,19 @@ fn options(context: usize) -> Lent {
         progress_user: elsewhere(),
         log: elsewhere(),
         log_user: elsewhere(),
+        calibrate: choice(&[0, 1]),
+        relight: choice(&[0, 1]),
+        photo: choice(&[0, 1]),
+        flags: reserved(),
+        budget_s: budget(),
+        cloud: elsewhere(),
+        cloud_count: counts(&[10_000_001, 1 << 60, u64::MAX]),
     });
     let mut lent = Lent::zeroed::<vg_options>("vg_options", fields);
     lent.put("context", 0, context as u64);
     lent.put("sh_degree", 0, 2);
     lent.put("check", 0, 1);
+    lent.put("photo", 0, 1);
     for (i, metres) in [4.4f64, 1.8, 1.4].into_iter().enumerate() {
         lent.put("vehicle_size", i, metres.to_bits());
     }

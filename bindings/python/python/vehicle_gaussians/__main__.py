@@ -15,7 +15,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("asset", metavar="ASSET.ply", help="the model to write")
     parser.add_argument("--views", metavar="NAME,...", help="views to use; all if not given")
     parser.add_argument("--vehicle-from-world", metavar="FILE", help="similarity from the scene's world, JSON")
-    parser.add_argument("--prior", choices=["auto", "given", "hull"], default="auto", help="depth source")
+    parser.add_argument("--prior", choices=["auto", "given", "hull", "shape"], default="auto", help="depth source")
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="worker threads; 0 means one per core")
     parser.add_argument("--version", action="version", version=__version__)
     chosen = parser.parse_args(arguments)

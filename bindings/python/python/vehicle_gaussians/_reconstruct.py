@@ -44,13 +44,18 @@ def reconstruct(
     cameras: Iterable[Camera],
     depths: Iterable[npt.NDArray[np.float32] | None] | None = None,
     *,
-    prior: Literal["auto", "given", "hull"] = "auto",
+    prior: Literal["auto", "given", "hull", "shape"] = "auto",
+    calibrate: Literal["auto", "off"] = "auto",
     symmetry: Literal["auto", "always", "never"] = "auto",
+    relight: Literal["auto", "never"] = "auto",
+    photo: bool = True,
+    cloud: npt.NDArray[np.float32] | None = None,
     vehicle_size: tuple[float, float, float] | None = None,
     sh_degree: int = 2,
     keep: str | Iterable[str] = (),
     check: bool = True,
     points: bool = False,
+    budget: float | None = None,
     threads: int = 0,
     names: Iterable[str] | None = None,
     progress: Callable[[str, float], object] | None = None,
@@ -62,33 +67,46 @@ def reconstruct(
     cameras: one per image, posed in the vehicle's frame (x forward, y left, z up, metres; y = 0 is the plane of
     symmetry).
     depths: float32 (height, width), metres along the optical axis, 0 for none.
-    prior: "given" takes the depths, "hull" the silhouettes, "auto" the depths if every used view has them.
+    prior: "given" takes the depths, "hull" the silhouettes, "shape" the silhouettes and what vehicles look like; "auto"
+    the depths if every used view has them, else "shape".
+    calibrate: correct cameras and the plane of symmetry where the silhouettes contradict them ("auto"), or take them
+    as they are ("off").
     symmetry: mirror what no view observed ("auto"), all of the denser side ("always"), or nothing ("never").
+    relight: show mirror images in the light of their own side ("auto"), or as they were seen ("never").
+    photo: whether prior "shape" moves its surface to where the photographs agree.
+    cloud: points measured on the vehicle, float32 (n, 3), metres, vehicle frame, all finite; some may be wrong or show
+    something else. Priors "shape" and "hull" bend their surface to them.
     vehicle_size: length, width, height in metres, where known.
     sh_degree: highest degree of the colour, 0 to 3.
     keep: what may not be left out as not needed: "duplicate-views", "overlap", "silhouette-edge", "floaters",
     "sh-bands", or "all".
     check: draw the model into its input views for the report.
     points: return the point cloud as well.
+    budget: seconds the call may take, where that matters; what is left out is then chosen to fit.
     threads: worker threads; 0 means one per core. The result is the same with any number.
     names: of the views, for messages and the report.
     progress: called as progress(stage, fraction) on this thread; a true return value cancels (a VgError with code
     CANCELLED), an exception passes through. Ctrl-C raises KeyboardInterrupt at the next call.
     """
-    gaussians, report, cloud = _native.reconstruct(
+    gaussians, report, lifted = _native.reconstruct(
         list(images),
         None if masks is None else list(masks),
         list(cameras),
         None if depths is None else list(depths),
         prior=prior,
+        calibrate=calibrate,
         symmetry=symmetry,
+        relight=relight,
+        photo=photo,
+        cloud=cloud,
         vehicle_size=None if vehicle_size is None else list(vehicle_size),
         sh_degree=sh_degree,
         keep=[keep] if isinstance(keep, str) else list(keep),
         check=check,
         points=points,
+        budget=budget,
         threads=threads,
         names=None if names is None else list(names),
         progress=progress,
     )
-    return Reconstruction(gaussians, json.loads(report), None if cloud is None else Points(*cloud))
+    return Reconstruction(gaussians, json.loads(report), None if lifted is None else Points(*lifted))

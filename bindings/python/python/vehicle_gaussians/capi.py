@@ -54,13 +54,25 @@ class CameraModel(enum.IntEnum):
 class Prior(enum.IntEnum):
     """vg_prior"""
 
-    AUTO, GIVEN, HULL, ONNX = range(4)
+    AUTO, GIVEN, HULL, ONNX, SHAPE = range(5)
+
+
+class Calibrate(enum.IntEnum):
+    """vg_calibrate"""
+
+    AUTO, OFF = range(2)
 
 
 class Symmetry(enum.IntEnum):
     """vg_symmetry"""
 
     AUTO, ALWAYS, NEVER = range(3)
+
+
+class Relight(enum.IntEnum):
+    """vg_relight"""
+
+    AUTO, NEVER = range(2)
 
 
 class Keep(enum.IntFlag):
@@ -73,6 +85,12 @@ class LogLevel(enum.IntEnum):
     """vg_log_level"""
 
     WARNING, INFO, DEBUG = range(1, 4)
+
+
+class Calibration(enum.IntEnum):
+    """vg_calibration"""
+
+    NONE, NOT_NEEDED, ACCEPTED, REFUSED = range(4)
 
 
 class Backend(enum.IntEnum):
@@ -159,6 +177,13 @@ class vg_options(ct.Structure):
         ("progress_user", ct.c_void_p),
         ("log", LogFn),
         ("log_user", ct.c_void_p),
+        ("calibrate", ct.c_int32),
+        ("relight", ct.c_int32),
+        ("photo", ct.c_int32),
+        ("flags", ct.c_uint32),
+        ("budget_s", ct.c_double),
+        ("cloud", ct.c_void_p),
+        ("cloud_count", ct.c_size_t),
     )
 
 
@@ -180,6 +205,15 @@ class vg_report_figures(ct.Structure):
         ("box_size", ct.c_double * 3),
         ("extent_low", ct.c_double * 3),
         ("extent_high", ct.c_double * 3),
+        ("relit_count", ct.c_uint64),
+        ("cloud_used", ct.c_uint64),
+        ("photo_found", ct.c_uint64),
+        ("calibration", ct.c_int32),
+        ("has_uncovered", ct.c_int32),
+        ("calibration_yaw_degrees", ct.c_double),
+        ("calibration_lateral_m", ct.c_double),
+        ("uncovered_before", ct.c_double),
+        ("uncovered_after", ct.c_double),
     )
 
 
@@ -725,13 +759,18 @@ def reconstruct(
     cameras: Iterable[Camera],
     depths: Iterable[npt.NDArray[np.float32] | None] | None = None,
     *,
-    prior: Literal["auto", "given", "hull"] = "auto",
+    prior: Literal["auto", "given", "hull", "shape"] = "auto",
+    calibrate: Literal["auto", "off"] = "auto",
     symmetry: Literal["auto", "always", "never"] = "auto",
+    relight: Literal["auto", "never"] = "auto",
+    photo: bool = True,
+    cloud: npt.NDArray[np.float32] | None = None,
     vehicle_size: Sequence[float] | None = None,
     sh_degree: int = 2,
     keep: Keep | int = 0,
     check: bool = True,
     points: bool = False,
+    budget: float | None = None,
     names: Iterable[str] | None = None,
     progress: Callable[[str, float], object] | None = None,
     log: Callable[[LogLevel, str], object] | None = None,
@@ -767,6 +806,19 @@ def reconstruct(
     options = _initial(vg_options)
     options.context = None if context is None else context._as_parameter_
     options.prior, options.symmetry = _choice(Prior, "prior", prior), _choice(Symmetry, "symmetry", symmetry)
+    options.calibrate = _choice(Calibrate, "calibrate", calibrate)
+    options.relight, options.photo = _choice(Relight, "relight", relight), photo
+    if budget is not None:
+        # Of C, 0 is none.
+        if budget == 0:
+            raise VgError(Status.ARGUMENT, f"budget: {budget}; allowed: seconds above 0")
+        options.budget_s = budget
+    if cloud is not None:
+        _expect(cloud, "cloud", np.float32)
+        if cloud.ndim != 2 or cloud.shape[1] != 3:
+            raise VgError(Status.ARGUMENT, f"cloud: shape {cloud.shape}; allowed: (n, 3)")
+        alive.append(np.require(cloud, requirements=["C", "A"]))
+        options.cloud, options.cloud_count = alive[-1].ctypes.data, len(cloud)
     options.sh_degree, options.keep, options.check, options.points = sh_degree, keep, check, points
     options.vehicle_size[:] = (0, 0, 0) if vehicle_size is None else vehicle_size
     raised: list[BaseException] = []
@@ -791,14 +843,14 @@ def reconstruct(
     gaussians, told = Gaussians(_Handle("gaussians", car)), _Handle("report", report)
     if raised:
         raise raised[0]
-    cloud = None
+    lifted = None
     if points:
         count = int(library.vg_report_point_count(told))
-        cloud = Points(
+        lifted = Points(
             told.array(library.vg_report_point_positions(told), (count, 3), np.float32),
             told.array(library.vg_report_point_colors(told), (count, 3), np.uint8),
         )
-    return Reconstruction(gaussians, json.loads(library.vg_report_json(told)), cloud)
+    return Reconstruction(gaussians, json.loads(library.vg_report_json(told)), lifted)
 
 
 @contextlib.contextmanager

@@ -193,6 +193,7 @@ static vg_gaussians *reconstruct(vg_context *context, const vg_view *views, size
     vg_report *report = NULL;
     vg_error *error = NULL;
     told heard = {0, 0, 0, "", 0};
+    const float cloud[6] = {0, -0.9f, 0.6f, 0, (float)NAN, 0};
     size_t points;
 
     CHECK(vg_options_init(&options, sizeof options) == VG_STATUS_OK);
@@ -225,6 +226,29 @@ static vg_gaussians *reconstruct(vg_context *context, const vg_view *views, size
     report = (vg_report *)&heard;
     FAILS(vg_reconstruct(views, count, &options, &again, &report, &error), VG_STATUS_CANCELLED, heard.last_stage);
     CHECK(again == NULL && report == NULL);
+    options.progress = NULL;
+    CHECK(options.calibrate == VG_CALIBRATE_AUTO && options.relight == VG_RELIGHT_AUTO && options.photo == 1);
+    CHECK(options.budget_s == 0 && options.cloud == NULL && options.cloud_count == 0);
+    options.cloud_count = 2;
+    FAILS(vg_reconstruct(views, count, &options, &again, NULL, &error), VG_STATUS_ARGUMENT, "options.cloud: NULL");
+    options.cloud = cloud;
+    FAILS(vg_reconstruct(views, count, &options, &again, NULL, &error), VG_STATUS_ARGUMENT, "options.cloud[1]");
+    options.cloud_count = 1;
+    options.prior = VG_PRIOR_SHAPE;
+    options.calibrate = VG_CALIBRATE_OFF;
+    options.relight = VG_RELIGHT_NEVER;
+    options.photo = 0;
+    options.budget_s = 1e6;
+    if (!quick) {
+        DO(vg_reconstruct(views, count, &options, &again, &report, &error));
+        DO(vg_report_get_figures(report, &figures, &error));
+        CHECK(figures.prior == VG_PRIOR_SHAPE && figures.calibration == VG_CALIBRATION_NONE && figures.has_uncovered);
+        CHECK(figures.uncovered_after <= figures.uncovered_before && figures.uncovered_before < 0.2);
+        CHECK(figures.relit_count == 0 && figures.photo_found == 0 && figures.cloud_used <= 1);
+        vg_report_free(report);
+        vg_gaussians_free(again);
+        again = NULL;
+    }
     options.prior = VG_PRIOR_ONNX;
     CHECK(vg_reconstruct(views, count, &options, &again, NULL, NULL) != VG_STATUS_OK);
     return car;

@@ -255,7 +255,7 @@ enum vg_prior
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * `VG_PRIOR_GIVEN` if every used view has depth, else `VG_PRIOR_HULL`.
+     * `VG_PRIOR_GIVEN` if every used view has depth, else `VG_PRIOR_SHAPE`.
      */
     VG_PRIOR_AUTO = 0,
     /**
@@ -270,12 +270,41 @@ enum vg_prior
      * A network run by ONNX Runtime. `VG_STATUS_NOT_BUILT` in a build without it.
      */
     VG_PRIOR_ONNX = 3,
+    /**
+     * The hull, corrected by what vehicles look like; needs masks and nothing else.
+     */
+    VG_PRIOR_SHAPE = 4,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
 typedef enum vg_prior vg_prior;
 #else
 typedef int32_t vg_prior;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Whether cameras and the plane of symmetry are corrected before anything else.
+ */
+enum vg_calibrate
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Where the silhouettes do not agree, and agree better with the correction.
+     */
+    VG_CALIBRATE_AUTO = 0,
+    /**
+     * The cameras are taken as they are.
+     */
+    VG_CALIBRATE_OFF = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_calibrate vg_calibrate;
+#else
+typedef int32_t vg_calibrate;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -305,6 +334,31 @@ enum vg_symmetry
 typedef enum vg_symmetry vg_symmetry;
 #else
 typedef int32_t vg_symmetry;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Whether mirror images are shown in the light of their own side.
+ */
+enum vg_relight
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * As far as the light can be told from what was seen.
+     */
+    VG_RELIGHT_AUTO = 0,
+    /**
+     * They keep the light of the side that was seen.
+     */
+    VG_RELIGHT_NEVER = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_relight vg_relight;
+#else
+typedef int32_t vg_relight;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -371,6 +425,39 @@ enum vg_log_level
 typedef enum vg_log_level vg_log_level;
 #else
 typedef int32_t vg_log_level;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What became of the correction of the cameras.
+ */
+enum vg_calibration
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * None was looked for: it was switched off, or these views cannot be calibrated.
+     */
+    VG_CALIBRATION_NONE = 0,
+    /**
+     * The silhouettes agree already.
+     */
+    VG_CALIBRATION_NOT_NEEDED = 1,
+    /**
+     * The cameras were moved.
+     */
+    VG_CALIBRATION_ACCEPTED = 2,
+    /**
+     * A correction was estimated and thrown away.
+     */
+    VG_CALIBRATION_REFUSED = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_calibration vg_calibration;
+#else
+typedef int32_t vg_calibration;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -620,7 +707,7 @@ typedef struct vg_view {
     struct vg_image image;
     /**
      * GRAY8, of the camera's size: 128 and above is vehicle. `data` NULL: the photograph's alpha is the mask; where
-     * it has none, or one that is 255 throughout, every pixel is vehicle, which the silhouette prior refuses.
+     * it has none, or one that is 255 throughout, every pixel is vehicle, which the silhouette priors refuse.
      */
     struct vg_image mask;
     /**
@@ -702,6 +789,38 @@ typedef struct vg_options {
      * Handed to `log`.
      */
     void *log_user;
+    /**
+     * A `vg_calibrate`. Default `VG_CALIBRATE_AUTO`.
+     */
+    int32_t calibrate;
+    /**
+     * A `vg_relight`. Default `VG_RELIGHT_AUTO`.
+     */
+    int32_t relight;
+    /**
+     * 1: `VG_PRIOR_SHAPE` moves its surface to where the photographs agree; 0: it does not. Default 1.
+     */
+    int32_t photo;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t flags;
+    /**
+     * Seconds the call may take, above 0, where that matters: what is left out is then chosen to fit. 0: as long as
+     * it takes. Default 0.
+     */
+    double budget_s;
+    /**
+     * Points measured on the vehicle, by LiDAR for one: float32 `[cloud_count][3]` without gaps, metres, vehicle
+     * frame, in any order, all finite; some may be wrong or show something else. `VG_PRIOR_SHAPE` and
+     * `VG_PRIOR_HULL` bend their surface to them; `VG_PRIOR_GIVEN` leaves them out. Copied during the call. Default
+     * NULL: none.
+     */
+    const float *cloud;
+    /**
+     * How many points, at most 10000000; 0: none. Default 0.
+     */
+    size_t cloud_count;
 } vg_options;
 
 /**
@@ -772,6 +891,43 @@ typedef struct vg_report_figures {
      * Highest corner of the Gaussians' centres, metres.
      */
     double extent_high[3];
+    /**
+     * Mirror images that were shown in the light of their own side.
+     */
+    uint64_t relit_count;
+    /**
+     * Points of the cloud that the prior's surface was moved to.
+     */
+    uint64_t cloud_used;
+    /**
+     * Places that the photographs agree on, to which the prior's surface was moved.
+     */
+    uint64_t photo_found;
+    /**
+     * A `vg_calibration`.
+     */
+    int32_t calibration;
+    /**
+     * 1 if `uncovered_before` and `uncovered_after` hold what the prior's surface left open of the masks.
+     */
+    int32_t has_uncovered;
+    /**
+     * Rotation about z that brings the plane of symmetry that was found onto y = 0, degrees; of a refused
+     * correction, what was refused.
+     */
+    double calibration_yaw_degrees;
+    /**
+     * Shift along y that does, metres.
+     */
+    double calibration_lateral_m;
+    /**
+     * Part of the vehicle's pixels that the prior's surface did not cover, 0 to 1.
+     */
+    double uncovered_before;
+    /**
+     * The same after the surface was raised to meet them.
+     */
+    double uncovered_after;
 } vg_report_figures;
 
 /**
