@@ -158,6 +158,8 @@ impl vg_options {
             check: read::flag("options.check", self.check)?,
             photo: true,
             budget_s: None,
+            resolution: 1.0,
+            max_views: None,
             points: read::flag("options.points", self.points)?,
             // Not in the C options yet.
             relight: Default::default(),
