@@ -1,7 +1,7 @@
 //! Which views to keep where not all may be used: those that see the vehicle from the most different sides.
 
 use crate::prior::volume::whereabouts;
-use crate::scene::View;
+use crate::scene::{Mask, View};
 use glam::DVec3;
 
 /// Positions in `views` of at most `most`, in order. A view and its mirrored twin show the same, so directions
@@ -20,7 +20,7 @@ pub(super) fn spread(views: &[View], most: usize) -> Vec<usize> {
         a.angle_between(b).min(a.angle_between(b * flip))
     };
     // The view that shows most of the vehicle first, then always the one farthest from all that were taken.
-    let shown = |i: usize| views[i].mask.as_ref().map_or(0, |m| m.vehicle_pixels());
+    let shown = |i: usize| views[i].mask.as_ref().map_or(0, Mask::vehicle_pixels);
     let largest = (0..views.len()).rev().max_by_key(|&i| shown(i)).unwrap_or(0);
     let mut taken = vec![largest];
     let mut distance: Vec<f64> = (0..views.len()).map(|i| apart(i, largest)).collect();
