@@ -187,8 +187,10 @@ fn more_than_a_detectors_error_is_refused_and_reported() {
 
 #[test]
 fn silly_masks_give_finite_numbers_or_the_priors_own_error() {
-    let base =
-        || Scene { views: [-40.0, -140.0].map(|a| view(&format!("{a}"), camera(a, 6.5, 64, 48))).to_vec() };
+    let base = || Scene {
+        views: [-40.0, -140.0].map(|a| view(&format!("{a}"), camera(a, 6.5, 64, 48))).to_vec(),
+        cloud: None,
+    };
     let masks: [fn(u32, u32, Label) -> Label; 4] = [
         |_, _, _| Label::Vehicle,
         |u, v, _| if (u, v) == (32, 24) { Label::Vehicle } else { Label::Background },

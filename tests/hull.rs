@@ -13,7 +13,9 @@ use vg::scene::{Mask, Scene, View};
 fn estimate(scene: &Scene, size: Option<[f64; 3]>) -> Geometry {
     let mut proceed = |_| ControlFlow::Continue(());
     let threads = Threads::new(2).unwrap();
-    HullPrior { size, cloud: None }.estimate(&scene.views, &Context::new(&threads, &mut proceed)).unwrap()
+    HullPrior { size, ..HullPrior::default() }
+        .estimate(&scene.views, &Context::new(&threads, &mut proceed))
+        .unwrap()
 }
 
 /// Depth of the hull minus true depth, pixel by pixel, for view i.

@@ -486,3 +486,109 @@ fn a_grey_picture_and_a_black_one_keep_their_colour() {
         assert!((color - f32::from(value) / 255.0).abs() < 0.01, "{value}: {color}");
     }
 }
+
+#[test]
+fn a_huge_budget_changes_no_byte_and_no_setting() {
+    let scene = without_depth(right_side(96, 72));
+    let free = run(&scene, &Options::default());
+    let made = run(&scene, &Options { budget_s: Some(1e6), ..Options::default() });
+    assert!(made.gaussians == free.gaussians);
+    assert_eq!(made.report.settings, Options::default());
+    assert_eq!(made.report.left_out, free.report.left_out);
+    let plan = made.report.plan.unwrap();
+    assert!(plan.fits && plan.budget_s == 1e6 && plan.predicted_s > 0.0 && plan.machine.serial > 0.0);
+    assert_eq!(free.report.plan, None);
+}
+
+#[test]
+fn a_budget_that_cannot_be_kept_takes_the_cheapest_and_says_so() {
+    for (scene, prior) in [
+        (without_depth(right_side(160, 120)), "hull"),
+        (right_side(160, 120), "given"),
+        (Scene { views: without_depth(right_side(160, 120)).views[1..2].to_vec(), cloud: None }, "hull"),
+    ] {
+        let made = run(&scene, &Options { budget_s: Some(1e-6), ..Options::default() });
+        let plan = made.report.plan.clone().unwrap();
+        assert!(!plan.fits && plan.predicted_s > 1e-6, "{plan:?}");
+        assert_eq!(made.report.prior, prior);
+        assert!(plan.chosen.resolution <= 0.25 && !plan.chosen.check && made.report.input_error.is_none());
+        assert_eq!(made.report.views_used.len(), 1);
+        assert!(left_out(&made, "budget of 0.000001 s") >= 3, "{:?}", made.report.left_out);
+        assert!(left_out(&made, "working resolution") > 0);
+        assert!(left_out(&made, "max_views") == scene.views.len() - 1);
+    }
+}
+
+#[test]
+fn what_a_budget_chose_gives_the_same_bytes_without_it() {
+    let scene = without_depth(right_side(160, 120));
+    let full = run(&scene, &Options { budget_s: Some(1e6), ..Options::default() }).report.plan.unwrap();
+    for part in [0.8, 0.5, 0.3, 0.1, 1e-4] {
+        let budget_s = Some(part * full.predicted_s);
+        let chosen = run(&scene, &Options { budget_s, points: true, ..Options::default() });
+        assert_ne!(chosen.report.settings, Options { points: true, ..Options::default() }, "{part}");
+        assert_eq!(chosen.report.settings.budget_s, None);
+        let again = run(&scene, &chosen.report.settings);
+        assert!(again.gaussians == chosen.gaussians && again.points == chosen.points, "{part}");
+        assert_eq!(again.report.settings, chosen.report.settings);
+        assert_eq!(again.report.input_error, chosen.report.input_error);
+    }
+}
+
+#[test]
+fn a_lower_resolution_makes_a_coarser_model_of_the_same_vehicle() {
+    let scene = right_side(320, 240);
+    for prior in [PriorChoice::Given, PriorChoice::Hull, PriorChoice::Shape] {
+        let at = |resolution| run(&scene, &Options { prior, resolution, ..Options::default() });
+        let (full, half) = (at(1.0), at(0.5));
+        let part = half.gaussians.len() as f64 / full.gaussians.len() as f64;
+        assert!((0.2..0.35).contains(&part), "{prior:?}: {part}");
+        let (a, b) = (full.report.extent_m.unwrap(), half.report.extent_m.unwrap());
+        for k in 0..3 {
+            assert!(
+                (a.0[k] - b.0[k]).abs() < 0.15 && (a.1[k] - b.1[k]).abs() < 0.15,
+                "{prior:?}: {a:?} {b:?}"
+            );
+        }
+        let unseen = view("unseen", camera(90.0, 6.5, 320, 240));
+        let psnr = |made: &Reconstruction| {
+            let options = RenderOptions::default();
+            let drawn = CpuRenderer::new().render(&made.gaussians, &unseen.camera, &options).unwrap();
+            metrics::psnr(&drawn.color, &metrics::on_white(&unseen))
+        };
+        assert!(psnr(&half) > psnr(&full) - 4.0, "{prior:?}: {} {}", psnr(&half), psnr(&full));
+    }
+}
+
+#[test]
+fn at_most_so_many_views_are_used_and_pictures_of_one_pixel_are_no_trouble() {
+    let scene = right_side(96, 72);
+    let made = run(&scene, &Options { max_views: Some(2), ..Options::default() });
+    assert_eq!(made.report.views_used.len(), 2);
+    assert_eq!(left_out(&made, "max_views"), scene.views.len() - 2);
+
+    let dot = right_side(1, 1);
+    for budget_s in [None, Some(1e-6), Some(1e6)] {
+        let options = Options { budget_s, resolution: 0.1, ..Options::default() };
+        // Whether one pixel makes a vehicle does not matter; that it is no panic does.
+        match reconstruct(&dot, &options, &mut |_| ControlFlow::Continue(())) {
+            Ok(made) => assert!(!made.gaussians.is_empty()),
+            Err(e) => assert!(!e.to_string().is_empty()),
+        }
+    }
+}
+
+#[test]
+fn budgets_resolutions_and_numbers_of_views_that_make_no_sense_are_refused() {
+    let scene = right_side(16, 12);
+    let refused = |options: Options, argument: &str| {
+        let error = reconstruct(&scene, &options, &mut |_| ControlFlow::Continue(())).unwrap_err();
+        assert!(error.to_string().starts_with(argument), "{error}");
+    };
+    for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        refused(Options { budget_s: Some(wrong), ..Options::default() }, "options.budget_s: ");
+        refused(Options { resolution: wrong, ..Options::default() }, "options.resolution: ");
+    }
+    refused(Options { resolution: 1.01, ..Options::default() }, "options.resolution: ");
+    refused(Options { max_views: Some(0), ..Options::default() }, "options.max_views: 0");
+}

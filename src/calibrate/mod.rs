@@ -213,7 +213,7 @@ impl Judge<'_> {
         let held_out = |met: &[Meeting]| self.error(met, |s| s.held_out);
         let (had, has) = (held_out(before), held_out(after));
         // A NaN is no gain either.
-        if !(has <= (1.0 - LEAST_GAIN) * had) {
+        if has.is_nan() || has > (1.0 - LEAST_GAIN) * had {
             return Some(format!(
                 "edges that were held out miss the hull by {has:.2} pixels instead of {had:.2}, too little gain"
             ));

@@ -219,6 +219,8 @@ impl vg_options {
             check: read::flag("options.check", self.check)?,
             photo: read::flag("options.photo", self.photo)?,
             budget_s: (self.budget_s != 0.0).then_some(self.budget_s),
+            resolution: 1.0,
+            max_views: None,
             points: read::flag("options.points", self.points)?,
             threads: 0,
         })

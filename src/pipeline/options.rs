@@ -69,6 +69,10 @@ pub struct Options {
     pub photo: bool,
     /// Seconds the whole call may take, where that matters: the plan then chooses what to leave out.
     pub budget_s: Option<f64>,
+    /// Views are resampled to this share of their width and height before anything else, above 0 to 1.
+    pub resolution: f64,
+    /// Most views to use; those are kept that spread best around the vehicle.
+    pub max_views: Option<usize>,
     /// Worker threads; 0 means one per core.
     pub threads: usize,
     /// Whether to return the metric coloured point cloud as well.
@@ -88,6 +92,8 @@ impl Default for Options {
             check: true,
             photo: true,
             budget_s: None,
+            resolution: 1.0,
+            max_views: None,
             threads: 0,
             points: false,
         }
@@ -111,6 +117,13 @@ impl Options {
             && !(budget > 0.0 && budget.is_finite())
         {
             return Err(Error::argument("options.budget_s", budget.to_string(), "seconds above 0"));
+        }
+        if !(self.resolution > 0.0 && self.resolution <= 1.0) {
+            let found = self.resolution.to_string();
+            return Err(Error::argument("options.resolution", found, "above 0, at most 1"));
+        }
+        if self.max_views == Some(0) {
+            return Err(Error::argument("options.max_views", "0", "at least 1"));
         }
         if self.sh_degree > crate::gaussians::sh::MAX_DEGREE {
             return Err(Error::argument("options.sh_degree", self.sh_degree.to_string(), "0 to 3"));

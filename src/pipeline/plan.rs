@@ -19,8 +19,8 @@ const NARROW_DEGREES: f64 = 10.0;
 /// Within this a linear change of colour with direction is all that can be told, degrees.
 const WIDE_DEGREES: f64 = 40.0;
 
-/// Indices of the views worth using, and what was left out.
-pub(super) fn views(scene: &Scene, keep: &Keep) -> Result<(Vec<usize>, Vec<LeftOut>)> {
+/// Indices of the views worth using.
+pub(super) fn views(scene: &Scene, keep: &Keep, left_out: &mut Vec<LeftOut>) -> Result<Vec<usize>> {
     let mut used: Vec<usize> = Vec::new();
     let (mut empty, mut duplicate) = (0, 0);
     for (i, view) in scene.views.iter().enumerate() {
@@ -39,10 +39,9 @@ pub(super) fn views(scene: &Scene, keep: &Keep) -> Result<(Vec<usize>, Vec<LeftO
             "at least one view that shows the vehicle",
         ));
     }
-    let mut left_out = Vec::new();
-    note(&mut left_out, "views", "the mask is empty: the view does not show the vehicle", empty);
-    note(&mut left_out, "views", "another view has the same camera", duplicate);
-    Ok((used, left_out))
+    note(left_out, "views", "the mask is empty: the view does not show the vehicle", empty);
+    note(left_out, "views", "another view has the same camera", duplicate);
+    Ok(used)
 }
 
 fn same_camera(a: &View, b: &View) -> bool {

@@ -1,5 +1,6 @@
 //! What a reconstruction did, how long it took, what it left out, and the error it can know.
 
+use super::budget::BudgetPlan;
 use super::options::Options;
 use crate::calibrate::Calibration;
 use crate::prior::{BoxSource, Filled, PhotoFit, PointFit, VehicleBox};
@@ -90,6 +91,8 @@ pub struct Report {
     pub photo: Option<PhotoFit>,
     /// How the prior closed what its surface left open of the masks.
     pub masks: Option<Filled>,
+    /// How the options were chosen, where the caller gave a budget.
+    pub plan: Option<BudgetPlan>,
     /// Work this scene did not need.
     pub left_out: Vec<LeftOut>,
     /// How the unseen side was completed.
@@ -98,7 +101,8 @@ pub struct Report {
     pub relight: Option<Relighting>,
     /// Error on the input views, unless the check was switched off.
     pub input_error: Option<InputError>,
-    /// The options of the call.
+    /// The options of the call; where it had a budget, those that were chosen: with them and without a budget another
+    /// call does the same.
     pub settings: Options,
 }
 
@@ -120,6 +124,10 @@ impl Clock {
         let now = Instant::now();
         self.stages.push(Stage { name, ms: (now - self.last).as_secs_f64() * 1e3 });
         self.last = now;
+    }
+
+    pub(super) fn elapsed(&self) -> std::time::Duration {
+        self.start.elapsed()
     }
 
     pub(super) fn finish(self) -> (Vec<Stage>, f64) {

@@ -2,12 +2,13 @@
 
 use super::options::{Calibrate, Options, PriorChoice};
 use super::pixels::{self, BETTER};
-use super::plan;
-use super::report::{Clock, InputError, Report, peak_rss_bytes};
+use super::report::{Clock, InputError, LeftOut, Report, peak_rss_bytes};
+use super::spread::spread;
+use super::{budget, cost, plan};
 use crate::calibrate::{self, Calibrated, Moved};
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
-use crate::geometry::Similarity;
+use crate::geometry::{Camera, Similarity};
 use crate::head::surfel::FOOTPRINT_SIGMA_PX;
 use crate::head::{GaussianHead, SurfelHead};
 use crate::metrics;
@@ -16,7 +17,7 @@ use crate::progress::{Context, ProgressCallback, Threads};
 use crate::relight::{Light, Relight, Relighting};
 use crate::render::{CpuRenderer, RenderOptions, Renderer};
 use crate::scene::visibility::{Observer, SURFACE_M, Sight};
-use crate::scene::{Cloud, Scene, View, undistort};
+use crate::scene::{Cloud, Scene, View, resize, undistort};
 use crate::symmetry::{self, Completion, MirroredPlace, SymmetryMode};
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
@@ -73,11 +74,15 @@ pub fn reconstruct_on<'a>(
     let mut clock = Clock::start();
 
     context.report("plan", 0.0)?;
-    let (used, mut left_out) = plan::views(scene, &options.keep)?;
+    let mut left_out = Vec::new();
+    let (options, budget) = budget::resolved(scene, options, &context, || clock.elapsed(), &mut left_out);
+    let options = &options;
+    let used = plan::views(scene, &options.keep, &mut left_out)?;
+    let used = chosen_views(scene, used, options, &mut left_out);
     clock.lap("plan");
 
     context.report("undistort", 0.0)?;
-    let views = undistorted(scene, &used, &context)?;
+    let views = undistorted(scene, &used, options, &mut left_out, &context)?;
     clock.lap("undistort");
 
     context.report("calibrate", 0.0)?;
@@ -124,7 +129,7 @@ pub fn reconstruct_on<'a>(
         context.parallel(|| complete(gaussians, options, &views, &geometry));
     plan::note(&mut left_out, "clones", "the mirrored place was observed by a view", completion.not_needed);
     let (gaussians, points, views) = match &moved {
-        Some(moved) => back_in_vehicle(gaussians, points, moved, &context)?,
+        Some(moved) => back_in_vehicle(&gaussians, points, moved, &context)?,
         None => (gaussians, points, views),
     };
     clock.lap("symmetry");
@@ -153,6 +158,7 @@ pub fn reconstruct_on<'a>(
         cloud: geometry.points,
         photo: geometry.photo,
         masks: geometry.masks,
+        plan: budget,
         left_out,
         symmetry: completion,
         relight,
@@ -162,16 +168,57 @@ pub fn reconstruct_on<'a>(
     Ok(Reconstruction { gaussians, points, report })
 }
 
-fn undistorted(scene: &Scene, used: &[usize], context: &Context) -> Result<Vec<View>> {
-    context.parallel(|| used.par_iter().map(|&i| undistort::undistorted(&scene.views[i])).collect())
+/// As many of the used views as the caller wants.
+fn chosen_views(
+    scene: &Scene,
+    used: Vec<usize>,
+    options: &Options,
+    left_out: &mut Vec<LeftOut>,
+) -> Vec<usize> {
+    let Some(most) = options.max_views.filter(|most| *most < used.len()) else { return used };
+    let views: Vec<View> = used.iter().map(|&i| scene.views[i].clone()).collect();
+    let why = format!("more than max_views, {most}: those that were kept spread best around the vehicle");
+    plan::note(left_out, "views", &why, used.len() - most);
+    spread(&views, most).into_iter().map(|i| used[i]).collect()
+}
+
+/// The views at the resolution to work at, as pinholes.
+fn undistorted(
+    scene: &Scene,
+    used: &[usize],
+    options: &Options,
+    left_out: &mut Vec<LeftOut>,
+    context: &Context,
+) -> Result<Vec<View>> {
+    let one = |&i: &usize| undistort::undistorted(&resize::resized(&scene.views[i], options.resolution)?);
+    let mut views: Vec<View> = context.parallel(|| used.par_iter().map(one).collect::<Result<_>>())?;
+    if options.resolution < 1.0 {
+        let pixels = |camera: &Camera| camera.width as usize * camera.height as usize;
+        let all: usize = used.iter().map(|&i| pixels(&scene.views[i].camera)).sum();
+        let left: usize = views.iter().map(|v| pixels(&v.camera)).sum();
+        let why = format!("averaged into fewer: the working resolution is {}", options.resolution);
+        plan::note(left_out, "pixels", &why, all.saturating_sub(left));
+        views.retain(|v| v.mask.as_ref().is_none_or(|m| m.vehicle_pixels() > 0));
+        let why = "at the working resolution no pixel shows the vehicle";
+        plan::note(left_out, "views", why, used.len() - views.len());
+        if views.is_empty() {
+            let found = options.resolution.to_string();
+            let allowed = "a share at which some pixel shows the vehicle";
+            return Err(Error::argument("options.resolution", found, allowed));
+        }
+    }
+    Ok(views)
 }
 
 fn chosen_prior(choice: PriorChoice, cloud: Option<Cloud>, options: &Options) -> Box<dyn DepthPrior> {
     let size = options.vehicle_size;
+    let voxel_m = cost::voxel_m(options.resolution);
     match choice {
         PriorChoice::Given => Box::new(GivenDepth),
-        PriorChoice::Hull => Box::new(HullPrior { size, cloud }),
-        PriorChoice::Shape | PriorChoice::Auto => Box::new(ShapePrior { size, cloud, photo: options.photo }),
+        PriorChoice::Hull => Box::new(HullPrior { size, cloud, voxel_m }),
+        PriorChoice::Shape | PriorChoice::Auto => {
+            Box::new(ShapePrior { size, cloud, photo: options.photo, voxel_m })
+        }
     }
 }
 
@@ -242,7 +289,7 @@ fn mirrored_place(gaussians: &Gaussians, i: usize) -> (Vec3, Vec3, f32) {
 
 /// All in the caller's frame again, the views with the cameras that the calibration found.
 fn back_in_vehicle(
-    gaussians: Gaussians,
+    gaussians: &Gaussians,
     points: Option<PointCloud>,
     moved: &Moved,
     context: &Context,

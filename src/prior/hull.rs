@@ -20,7 +20,7 @@ use crate::scene::{Cloud, View};
 use rayon::prelude::*;
 
 /// Finest useful grid spacing, metres: a pixel's footprint at the usual distances.
-const FINEST_VOXEL_M: f64 = 0.02;
+pub(crate) const FINEST_VOXEL_M: f64 = 0.02;
 
 /// Grid points along the longest side; bounds memory at about 2 M points for a car's proportions.
 const MOST_POINTS: f64 = 224.0;
@@ -40,6 +40,8 @@ pub struct HullPrior {
     pub size: Option<[f64; 3]>,
     /// Points measured on the vehicle, where there are some.
     pub cloud: Option<Cloud>,
+    /// Grid spacing, metres, where a coarser one than the finest useful one will do.
+    pub voxel_m: Option<f64>,
 }
 
 impl DepthPrior for HullPrior {
@@ -54,7 +56,7 @@ impl DepthPrior for HullPrior {
         context.report("prior", 0.15)?;
         let vehicle_box = context.parallel(|| self.find_box(views, &silhouettes))?;
         context.report("prior", 0.3)?;
-        let hull = context.parallel(|| carve(&silhouettes, &vehicle_box));
+        let hull = context.parallel(|| carve(&silhouettes, &vehicle_box, self.voxel_m));
         context.report("prior", 0.5)?;
         let mut field = hull.clone();
         let masks = context.parallel(|| {
@@ -98,16 +100,16 @@ impl HullPrior {
     }
 }
 
-/// Grid spacing for a vehicle of this size, metres.
-pub(super) fn voxel(vehicle_box: &VehicleBox) -> f64 {
+/// Grid spacing for a vehicle of this size, metres, but no finer than `coarser`.
+pub(super) fn voxel(vehicle_box: &VehicleBox, coarser: Option<f64>) -> f64 {
     let longest = vehicle_box.size().into_iter().fold(0.0, f64::max);
-    (longest / MOST_POINTS).max(FINEST_VOXEL_M)
+    (longest / MOST_POINTS).max(coarser.unwrap_or(FINEST_VOXEL_M)).max(FINEST_VOXEL_M)
 }
 
 /// The hull in its box, with a margin so that the surface lies inside the grid.
-fn carve(silhouettes: &[Silhouette], vehicle_box: &VehicleBox) -> Field {
+fn carve(silhouettes: &[Silhouette], vehicle_box: &VehicleBox, coarser: Option<f64>) -> Field {
     let (low, high) = (glam::DVec3::from_array(vehicle_box.low), glam::DVec3::from_array(vehicle_box.high));
-    let voxel = voxel(vehicle_box);
+    let voxel = voxel(vehicle_box, coarser);
     let margin = glam::DVec3::splat(2.0 * voxel);
     Field::carve(low - margin, high + margin, voxel, |p| {
         inside_all(silhouettes, p).min(inside_box(vehicle_box, p))

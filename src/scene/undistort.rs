@@ -147,7 +147,8 @@ impl Taps {
         top + (bottom - top) * self.down
     }
 
-    fn nearest(&self) -> usize {
+    /// Row-order index of the pixel that the position lies in.
+    pub(crate) fn nearest(&self) -> usize {
         self.index[usize::from(self.across >= 0.5) + 2 * usize::from(self.down >= 0.5)]
     }
 }
@@ -171,7 +172,7 @@ fn label_at(mask: &Mask, taps: &Taps) -> Label {
 
 /// Depth in metres, 0 for none: bilinear in inverse depth (linear on a plane) where all four pixels lie on the
 /// surface of the nearest one, else that pixel's own.
-fn depth_at(depth: &DepthMap, taps: &Taps) -> f32 {
+pub(crate) fn depth_at(depth: &DepthMap, taps: &Taps) -> f32 {
     /// Neighbours on one surface differ by less, relatively.
     const SAME_SURFACE: f32 = 0.02;
     let nearest = depth.depth()[taps.nearest()];

@@ -67,6 +67,12 @@ pub(crate) struct MethodArgs {
     /// Seconds the reconstruction may take: what does not fit is left out
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     budget: Option<f64>,
+    /// Resample the views to this share of their width and height first
+    #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = share)]
+    resolution: f64,
+    /// Use at most this many views, those that spread best around the vehicle
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    max_views: Option<usize>,
     /// Do not move the shape prior's surface to where the photographs agree
     #[arg(long)]
     no_photo: bool,
@@ -111,6 +117,8 @@ impl MethodArgs {
             check: true,
             photo: !self.no_photo,
             budget_s: self.budget,
+            resolution: self.resolution,
+            max_views: self.max_views,
             threads: self.threads,
             points: false,
         }
@@ -338,4 +346,13 @@ fn positive(text: &str) -> Result<f64, String> {
         .ok()
         .filter(|value: &f64| *value > 0.0 && value.is_finite())
         .ok_or_else(|| "expected a number above 0".into())
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    let inside = |share: &f64| *share > 0.0 && *share <= 1.0;
+    text.parse().ok().filter(inside).ok_or_else(|| "expected a number above 0, at most 1".into())
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above 0".into())
 }

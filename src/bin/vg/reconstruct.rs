@@ -1,11 +1,11 @@
 //! `vg reconstruct`: a scene in, a model out.
 
 use crate::args::{Prior, ReconstructArgs};
-use crate::job::{Outcome, Result};
+use crate::job::{Outcome, Result, note};
 use crate::shown::Bar;
 use crate::{cloud, files, scene, shown};
 use vg::io::ply;
-use vg::pipeline::{self, Options, Reconstruction};
+use vg::pipeline::{self, BudgetPlan, Options, Reconstruction};
 use vg::{Scene, io};
 
 /// Opens, reconstructs, writes.
@@ -27,6 +27,10 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
     opened.scene.cloud = args.method.cloud.as_deref().map(cloud::read).transpose()?;
     let settings = Options { points: args.points.is_some(), check: !args.no_check, ..args.method.options() };
     let made = reconstruct(&opened.scene, &settings)?;
+    if let Some(plan) = made.report.plan.as_ref().filter(|plan| !plan.fits) {
+        let BudgetPlan { budget_s, predicted_s, .. } = plan;
+        note(&format!("the budget of {budget_s} s cannot be kept: the least takes about {predicted_s:.2} s"));
+    }
 
     ply::write(&args.output, &made.gaussians)?;
     if let (Some(path), Some(cloud)) = (&args.points, &made.points) {

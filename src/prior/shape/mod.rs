@@ -49,6 +49,8 @@ pub struct ShapePrior {
     pub cloud: Option<Cloud>,
     /// Whether the surface is also moved to where the photographs agree, see [`super::photo`].
     pub photo: bool,
+    /// Grid spacing, metres, where a coarser one than the finest useful one will do.
+    pub voxel_m: Option<f64>,
 }
 
 impl DepthPrior for ShapePrior {
@@ -57,7 +59,7 @@ impl DepthPrior for ShapePrior {
     }
 
     fn estimate(&self, views: &[View], context: &Context) -> Result<Geometry> {
-        let hull = HullPrior { size: self.size, cloud: None };
+        let hull = HullPrior { size: self.size, ..HullPrior::default() };
         hull.require_masks(views)?;
         let silhouettes: Vec<Silhouette> =
             context.parallel(|| views.par_iter().map(Silhouette::new).collect());
@@ -67,7 +69,7 @@ impl DepthPrior for ShapePrior {
         let network = Network::embedded()?;
         let shape = context.parallel(|| Shape::predict(network, &vehicle_box, &silhouettes, views));
         context.report("prior", 0.35)?;
-        let (mut field, hull) = context.parallel(|| shape.field(&vehicle_box, &silhouettes));
+        let (mut field, hull) = context.parallel(|| shape.field(&vehicle_box, &silhouettes, self.voxel_m));
         context.report("prior", 0.45)?;
         let photo = match self.photo {
             true => Some(context.parallel(|| fit_photographs(&mut field, &hull, views))?),
@@ -141,9 +143,14 @@ impl Shape {
     }
 
     /// On a fine grid, nowhere outside the hull, and the hull itself.
-    fn field(&self, vehicle_box: &VehicleBox, silhouettes: &[Silhouette]) -> (Field, Field) {
+    fn field(
+        &self,
+        vehicle_box: &VehicleBox,
+        silhouettes: &[Silhouette],
+        coarser: Option<f64>,
+    ) -> (Field, Field) {
         let (low, high) = (DVec3::from_array(vehicle_box.low), DVec3::from_array(vehicle_box.high));
-        let voxel = super::hull::voxel(vehicle_box);
+        let voxel = super::hull::voxel(vehicle_box, coarser);
         let margin = DVec3::new(2.0 * voxel, 0.12, 2.0 * voxel);
         let hull = Field::symmetric(low - margin, high + margin, voxel, |p| inside_both(silhouettes, p));
         let mut field = hull.clone();

@@ -427,7 +427,7 @@ mod tests {
     fn face(count: usize, wrong: usize) -> Vec<Pull> {
         let pull = |i: usize| {
             let r = Vec3::new(random(3 * i), random(3 * i + 1), random(3 * i + 2)) * 2.0 - 1.0;
-            let point = match i % wrong == 0 {
+            let point = match i.is_multiple_of(wrong) {
                 true => r * (TRUE + 0.2),
                 false => Vec3::new(r.x * TRUE.x, -TRUE.y, r.z * TRUE.z),
             };
