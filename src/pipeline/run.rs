@@ -115,7 +115,7 @@ pub fn reconstruct_on<'a>(
         context.parallel(|| complete(gaussians, options.symmetry, &views, &geometry));
     plan::note(&mut left_out, "clones", "the mirrored place was observed by a view", completion.not_needed);
     let (gaussians, points, views) = match &moved {
-        Some(moved) => back_in_vehicle(gaussians, points, moved, &context)?,
+        Some(moved) => back_in_vehicle(&gaussians, points, moved, &context)?,
         None => (gaussians, points, views),
     };
     clock.lap("symmetry");
@@ -222,7 +222,7 @@ fn mirrored_place(gaussians: &Gaussians, i: usize) -> (Vec3, Vec3, f32) {
 
 /// All in the caller's frame again, the views with the cameras that the calibration found.
 fn back_in_vehicle(
-    gaussians: Gaussians,
+    gaussians: &Gaussians,
     points: Option<PointCloud>,
     moved: &Moved,
     context: &Context,
