@@ -2,7 +2,7 @@
 //!
 //! Poses that come from a detector or a tracker put the plane of symmetry some centimetres and a degree or two off,
 //! and single cameras some pixels. Masks tell: the hull of all silhouettes and of their mirrored twins must fill every
-//! mask. Where it does not, the cameras are moved, a little, until it does. The steps are those of [`calibrate`];
+//! mask. Where it does not, the cameras are moved, a little, until it does. What it did is in [`Calibration`];
 //! what was measured is in docs/CALIBRATION.md.
 
 mod cones;
@@ -212,7 +212,6 @@ impl Judge<'_> {
         }
         let held_out = |met: &[Meeting]| self.error(met, |s| s.held_out);
         let (had, has) = (held_out(before), held_out(after));
-        // A NaN is no gain either.
         if has.is_nan() || has > (1.0 - LEAST_GAIN) * had {
             return Some(format!(
                 "edges that were held out miss the hull by {has:.2} pixels instead of {had:.2}, too little gain"
