@@ -85,13 +85,13 @@ fn cost(load: &Load, options: &Options) -> Cost {
         // The hull on the grid; most points are decided by the first silhouettes.
         cost.add(6.0 * points, (20.0 + 8.0 * views) * points);
         // Filling the masks, marching.
-        cost.add(30.0 + 25.0 * vehicle, 10.0 * points + 180.0 * vehicle);
+        cost.add(30.0 + 25.0 * vehicle, 35.0 * points + 730.0 * vehicle);
         if prior == PriorChoice::Hull {
             cost.add(0.0, 30.0 * points);
         } else {
             cost.add(2.0, 60.0 + 4.0 * views + 20.0 * points + 30.0 * vehicle);
             if options.photo {
-                cost.add(20.0 + 10.0 * vehicle, (300.0 + 100.0 * views) * vehicle);
+                cost.add(20.0 + 10.0 * vehicle, (400.0 + 400.0 * views) * vehicle);
             }
         }
         cost.add(50.0 * load.cloud, 100.0 * load.cloud);
