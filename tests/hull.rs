@@ -154,7 +154,9 @@ fn measured_points_correct_the_hull_and_those_elsewhere_are_counted() {
     let mut proceed = |_| ControlFlow::Continue(());
     let context = Context::new(&threads, &mut proceed);
     let of = |scene: &Scene| {
-        HullPrior { cloud: scene.cloud.clone(), ..HullPrior::default() }.estimate(&scene.views, &context).unwrap()
+        HullPrior { cloud: scene.cloud.clone(), ..HullPrior::default() }
+            .estimate(&scene.views, &context)
+            .unwrap()
     };
     let (corrected, plain) = (of(&with), of(&views));
     assert!(error(&corrected) < 0.6 * error(&plain), "{} {}", error(&corrected), error(&plain));

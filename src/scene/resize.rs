@@ -177,9 +177,8 @@ mod tests {
                 let Some(z) = depth.get(u, v) else { continue };
                 let true_z = plane(&small.camera, [f64::from(u) + 0.5, f64::from(v) + 0.5]);
                 let at_edge = !(1..small.camera.width - 1).contains(&u)
-                    || [(u - 1, v), (u + 1, v), (u, v - 1), (u, v + 1)]
-                        .iter()
-                        .any(|&(u, v)| depth.get(u, v).is_none());
+                    || !(1..small.camera.height - 1).contains(&v)
+                    || (0..9).any(|k| depth.get(u + k % 3 - 1, v + k / 3 - 1).is_none());
                 // Beside the edge the nearest pixel speaks, up to half an old pixel away.
                 let tolerance = if at_edge { 0.02 } else { 1e-5 };
                 assert!((f64::from(z) - true_z).abs() < tolerance, "{share} ({u}, {v}): {z} {true_z}");

@@ -73,7 +73,7 @@ fn asset() -> &'static Path {
     static ASSET: OnceLock<PathBuf> = OnceLock::new();
     ASSET.get_or_init(|| {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-        succeed(folder, &format!("reconstruct . --views {INPUTS} --prior hull -o {{}}/sedan.ply"));
+        succeed(folder, &format!("reconstruct . --views {INPUTS} --prior shape -o {{}}/sedan.ply"));
         folder.join("sedan.ply")
     })
 }

@@ -19,7 +19,7 @@ fn views_are_known_by_path_by_file_name_and_by_stem() {
 fn the_model_is_the_same_bytes_with_one_thread_and_with_two() {
     let folder = tempfile::tempdir().unwrap();
     for threads in [1, 2] {
-        let common = format!("reconstruct . --views {INPUTS} --prior hull --threads {threads}");
+        let common = format!("reconstruct . --views {INPUTS} --prior shape --threads {threads}");
         succeed(folder.path(), &format!("{common} -o {{}}/{threads}.ply --points {{}}/{threads}.points.ply"));
     }
     let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
@@ -44,20 +44,20 @@ fn auto_uses_depth_if_every_used_view_has_it_and_the_report_says_so() {
     };
     assert_eq!(prior("000,001"), "given");
     // 005 has no depth.
-    assert_eq!(prior("000,005"), "hull");
+    assert_eq!(prior("000,005"), "shape");
 }
 
 #[test]
 fn a_colmap_folder_with_its_similarity_gives_nearly_the_model_of_the_true_poses() {
     let scene = copy_of_sample(&["images", "masks", "sparse", "vehicle_from_world.json"]);
     let at = scene.path();
-    let common = "--prior hull --vehicle-from-world {}/vehicle_from_world.json";
+    let common = "--prior shape --vehicle-from-world {}/vehicle_from_world.json";
     succeed(at, &format!("reconstruct {{}} --views {INPUTS} {common} -o {{}}/colmap.ply"));
     let (colmap, _) = vg::io::ply::read(&at.join("colmap.ply")).unwrap();
     let (direct, _) = vg::io::ply::read(asset()).unwrap();
     let (n, expected) = (colmap.len() as f64, direct.len() as f64);
     assert!((n - expected).abs() < 0.01 * expected, "{n} Gaussians, {expected} with the true poses");
-    // COLMAP's model is written with all digits; the grid of the hull may still fall a hair differently.
+    // COLMAP's model is written with all digits; the grid may still fall a hair differently.
     let (low, high) = (colmap.bounds().unwrap(), direct.bounds().unwrap());
     for k in 0..3 {
         assert!((low.0[k] - high.0[k]).abs() < 0.02 && (low.1[k] - high.1[k]).abs() < 0.02);

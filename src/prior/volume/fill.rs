@@ -205,7 +205,8 @@ mod tests {
         assert!(filled.uncovered_before > 0.1, "{filled:?}");
         assert!(filled.uncovered_after < 0.2 * filled.uncovered_before, "{filled:?}");
         let rim = field.sample(Vec3::new(0.78, 0.0, 0.0));
-        assert!(rim > -0.015, "{rim}");
+        // Pixels are 33 mm wide; half of one is left to the surfels, and the lattice is as coarse.
+        assert!(rim > -0.04, "{rim}");
         // What the view sees in the middle of the mask stays where it was.
         let front = field.sample(Vec3::new(0.0, -0.74, 0.0));
         assert!(front.abs() < 1e-3, "{front}");
