@@ -68,6 +68,10 @@ pub(crate) struct Moved {
     pub(crate) vehicle_from_corrected: Similarity,
 }
 
+/// Cameras farther from the vehicle than this are not corrected, metres: f32 steps along their rays are no longer small
+/// against a pixel there.
+const FARTHEST_M: f64 = 1000.0;
+
 /// Undistorted views to views whose silhouettes agree.
 pub(crate) fn calibrate(views: &[View], context: &Context) -> Result<Calibrated> {
     let nothing = |why| Ok(Calibrated { moved: None, report: None, left_out: Some(why) });
@@ -83,6 +87,9 @@ pub(crate) fn calibrate(views: &[View], context: &Context) -> Result<Calibrated>
     let Some((middle, radius)) = whereabouts(views) else {
         return nothing("the views do not look at a common place near the plane y = 0");
     };
+    if !views.iter().all(|v| (v.camera.center() - middle).length() <= FARTHEST_M) {
+        return nothing("a camera is so far away that its silhouette tells no error of a detector's size");
+    }
     let ball = Ball { middle, radius };
     let silhouettes: Vec<Silhouette> = context.parallel(|| views.par_iter().map(Silhouette::new).collect());
     let samples = samples::edges(views, middle);

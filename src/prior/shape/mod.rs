@@ -12,12 +12,12 @@ pub mod lattice;
 mod network;
 
 use super::photo::fit_photographs;
-use super::volume::{Field, Silhouette, fill_masks, fit_points, inside_both, march};
+use super::volume::{Field, Silhouette, denied, fill_masks, fit_points, inside_both, march};
 use super::{DepthPrior, Geometry, HullPrior, VehicleBox};
 use crate::error::Result;
 use crate::progress::Context;
 use crate::scene::{Cloud, DepthMap, View};
-use glam::DVec3;
+use glam::{DVec3, IVec3, Vec3};
 use lattice::{HULL_CLAMP_M, Lattice, NODES, VIEW_NUMBERS, hull_on, view_numbers};
 use network::{Network, Planes};
 use rayon::prelude::*;
@@ -36,6 +36,13 @@ const TRUSTED_M: std::ops::Range<f32> = 0.10..0.30;
 
 /// The hull may be this much too thin, metres: masks and poses are not exact.
 const HULL_SLACK_M: f32 = 0.02;
+
+/// A ray of a vehicle pixel that passes the predicted surface by farther than this, and yet meets the hull, shows
+/// something that the network does not know, metres.
+const DENIED_M: f32 = 0.12;
+
+/// Nearer to such a place than the first no correction is applied, farther than the second all, metres.
+const GIVEN_UP_M: std::ops::Range<f32> = 0.2..0.4;
 
 /// The predicted surface is drawn in by this much, metres: a surfel reaches about half a pixel beyond its centre.
 const INSET_M: f32 = 0.01;
@@ -67,9 +74,17 @@ impl DepthPrior for ShapePrior {
         let vehicle_box = context.parallel(|| hull.find_box(views, &silhouettes))?;
         context.report("prior", 0.2)?;
         let network = Network::embedded()?;
-        let shape = context.parallel(|| Shape::predict(network, &vehicle_box, &silhouettes, views));
+        let mut shape = context.parallel(|| Shape::predict(network, &vehicle_box, &silhouettes, views));
         context.report("prior", 0.35)?;
-        let (mut field, hull) = context.parallel(|| shape.field(&vehicle_box, &silhouettes, self.voxel_m));
+        let (mut field, hull) = context.parallel(|| {
+            let (field, hull) = shape.field(&vehicle_box, &silhouettes, self.voxel_m);
+            let unknown = denied(&field, &hull, views, DENIED_M);
+            if unknown.is_empty() {
+                return (field, hull);
+            }
+            shape.give_up_near(&unknown);
+            (shape.bounded_by(&hull), hull)
+        });
         context.report("prior", 0.45)?;
         let photo = match self.photo {
             true => Some(context.parallel(|| fit_photographs(&mut field, &hull, views))?),
@@ -93,6 +108,8 @@ impl DepthPrior for ShapePrior {
 /// What the network says of half a vehicle.
 struct Shape {
     lattice: Lattice,
+    /// How far inside the hull, metres, clamped to the network's range. `[16][32][96]`
+    hull: Vec<f32>,
     /// Signed distance to the surface, positive inside, metres. `[16][32][96]`
     distance: Vec<f32>,
     /// Mean absolute error to be expected there, metres. `[16][32][96]`
@@ -107,22 +124,23 @@ impl Shape {
         views: &[View],
     ) -> Self {
         let lattice = Lattice::around(vehicle_box);
-        let hull = hull_on(&lattice, silhouettes);
+        let mut hull = hull_on(&lattice, silhouettes);
         let input = network_input(&hull, &view_numbers(vehicle_box, views));
         let answer = network.run(&input);
         let [nx, ny, nz] = NODES;
         let mut distance = vec![0.0f32; hull.len()];
         let mut error = vec![0.0f32; hull.len()];
+        hull.iter_mut().for_each(|h| *h = h.clamp(-UNIT_M, UNIT_M));
         for (row, hull) in hull.chunks_exact(nx).enumerate() {
             let (j, k) = (row / nz, row % nz);
             let (correction, log_scale) = (answer.row(j, k), answer.row(ny + j, k));
             for i in 0..nx {
                 let at = row * nx + i;
                 error[at] = UNIT_M * log_scale[i].clamp(*LOG_SCALE.start(), *LOG_SCALE.end()).exp();
-                distance[at] = hull[i].clamp(-UNIT_M, UNIT_M) + trust(error[at]) * UNIT_M * correction[i];
+                distance[at] = hull[i] + trust(error[at]) * UNIT_M * correction[i];
             }
         }
-        Self { lattice, distance, error }
+        Self { lattice, hull, distance, error }
     }
 
     /// The depth with its confidence, `c` = 1 / (1 + e / 0.05 m) where the network expects an error of `e`, times
@@ -153,9 +171,39 @@ impl Shape {
         let voxel = super::hull::voxel(vehicle_box, coarser);
         let margin = DVec3::new(2.0 * voxel, 0.12, 2.0 * voxel);
         let hull = Field::symmetric(low - margin, high + margin, voxel, |p| inside_both(silhouettes, p));
+        (self.bounded_by(&hull), hull)
+    }
+
+    /// On the hull's grid, nowhere outside it.
+    fn bounded_by(&self, hull: &Field) -> Field {
         let mut field = hull.clone();
         field.adjust(|p, hull| (self.lattice.sample(&self.distance, p) - INSET_M).min(hull + HULL_SLACK_M));
-        (field, hull)
+        field
+    }
+
+    /// Takes corrections back, all of them within [`GIVEN_UP_M`] of these places and their mirror images, then less
+    /// and less: the masks show something there that the network took away.
+    fn give_up_near(&mut self, places: &[Vec3]) {
+        let fold = |p: &Vec3| Vec3::new(p.x, p.y.abs(), p.z);
+        // Neighbouring rays tell the same.
+        let mut cells: Vec<[i32; 3]> =
+            places.iter().map(|p| (fold(p) / GIVEN_UP_M.start * 2.0).round().as_ivec3().to_array()).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        let places: Vec<Vec3> =
+            cells.iter().map(|c| IVec3::from_array(*c).as_vec3() * GIVEN_UP_M.start * 0.5).collect();
+        let [nx, _, nz] = NODES;
+        let lattice = self.lattice;
+        let rows = self.distance.par_chunks_mut(nx).zip(self.hull.par_chunks(nx)).enumerate();
+        rows.for_each(|(row, (distance, hull))| {
+            for (i, (distance, hull)) in distance.iter_mut().zip(hull).enumerate() {
+                let node = lattice.node(i, row / nz, row % nz);
+                let near =
+                    places.iter().map(|p| p.distance_squared(node)).fold(f32::INFINITY, f32::min).sqrt();
+                let kept = ((near - GIVEN_UP_M.start) / (GIVEN_UP_M.end - GIVEN_UP_M.start)).clamp(0.0, 1.0);
+                *distance = hull + kept * (*distance - hull);
+            }
+        });
     }
 }
 

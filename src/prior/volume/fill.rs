@@ -12,6 +12,7 @@ use crate::geometry::Camera;
 use crate::scene::View;
 use crate::scene::mask::{Label, Mask};
 use glam::DVec3;
+use glam::Vec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -117,6 +118,26 @@ impl Grid {
     }
 }
 
+/// Places that masks show and `field` denies: for rays of vehicle pixels that pass the field by more than `far`
+/// metres although they meet the `hull`, the point where they are deepest inside the hull. All views have masks.
+pub(crate) fn denied(field: &Field, hull: &Field, views: &[View], far: f32) -> Vec<Vec3> {
+    const STEP: usize = 5;
+    let of_view = |view: &View| {
+        let rays = Rays::of(view);
+        let mask = view.mask.as_ref().expect("hull views have masks");
+        let (width, height) = (mask.width() as usize, mask.height() as usize);
+        let place = |(u, v): (usize, usize)| {
+            let Meeting::Closest { z } = rays.meet(field, u, v) else { return None };
+            let missed = field.sample(rays.point(u, v, z)) < -far;
+            missed.then(|| rays.deepest(hull, u, v)).flatten()
+        };
+        let pixels = (0..height).step_by(STEP).flat_map(|v| (0..width).step_by(STEP).map(move |u| (u, v)));
+        let vehicle = pixels.filter(|&(u, v)| mask.labels()[v * width + u] == Label::Vehicle);
+        vehicle.filter_map(place).collect::<Vec<Vec3>>()
+    };
+    views.par_iter().map(of_view).collect::<Vec<_>>().concat()
+}
+
 /// A pixel that stands for some.
 #[derive(Clone, Copy)]
 struct Sample {
@@ -174,7 +195,7 @@ mod tests {
     use super::*;
     use crate::geometry::{Camera, Intrinsics, Pose};
     use crate::scene::RgbImage;
-    use glam::{DMat3, DVec3, Vec3};
+    use glam::{DMat3, DVec3};
 
     /// How far inside a ball around the origin, metres.
     fn ball(radius: f32) -> Field {

@@ -76,6 +76,18 @@ impl Rays {
         meet(field, self.origin, self.direction(u, v))
     }
 
+    /// Where a pixel's ray is deepest inside the field, of the first stretch it is inside; `None` if it never is.
+    pub(super) fn deepest(&self, field: &Field, u: usize, v: usize) -> Option<Vec3> {
+        let Meeting::Surface(first) = self.meet(field, u, v) else { return None };
+        let direction = self.direction(u, v);
+        let step = field.voxel() / direction.length();
+        let inside = |k: &usize| field.sample(self.origin + (first + *k as f32 * step) * direction);
+        // A field may be positive up to its border, where samples repeat.
+        let deepest =
+            (1..1000usize).take_while(|k| inside(k) > 0.0).max_by(|a, b| inside(a).total_cmp(&inside(b)));
+        Some(self.origin + (first + deepest.unwrap_or(0) as f32 * step) * direction)
+    }
+
     /// With z = 1 in the camera frame.
     fn direction(&self, u: usize, v: usize) -> Vec3 {
         let [x, y] = self.intrinsics.normalized_from_pixel([u as f64 + 0.5, v as f64 + 0.5]);
