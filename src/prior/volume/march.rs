@@ -71,6 +71,26 @@ impl Rays {
         meet(field, self.origin, self.direction(u, v))
     }
 
+    /// Where the pixel's ray is deepest inside, between entering the field's surface and leaving it.
+    pub(super) fn deepest(&self, field: &Field, u: usize, v: usize) -> Option<Vec3> {
+        let Meeting::Surface(enter) = self.meet(field, u, v) else { return None };
+        let step = 0.5 * field.voxel() / self.direction(u, v).length();
+        let value = |z: f32| field.sample(self.point(u, v, z));
+        let (mut deepest, mut z) = ((enter, value(enter)), enter + step);
+        let mut inside = value(z);
+        // Beyond the grid there is nothing, whatever its border says.
+        let (low, high) = field.bounds();
+        let last = enter + low.distance(high) / self.direction(u, v).length();
+        while inside >= 0.0 && z < last {
+            if inside > deepest.1 {
+                deepest = (z, inside);
+            }
+            z += step;
+            inside = value(z);
+        }
+        Some(self.point(u, v, deepest.0))
+    }
+
     /// With z = 1 in the camera frame.
     fn direction(&self, u: usize, v: usize) -> Vec3 {
         let [x, y] = self.intrinsics.normalized_from_pixel([u as f64 + 0.5, v as f64 + 0.5]);

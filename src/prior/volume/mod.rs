@@ -12,7 +12,7 @@ pub(crate) mod silhouette;
 pub(crate) use extent::{estimate_box, inside_all, inside_box, place_box};
 pub(crate) use field::Field;
 pub use fill::Filled;
-pub(crate) use fill::fill_masks;
+pub(crate) use fill::{fill_masks, hold_masks};
 pub use points::PointFit;
 pub(crate) use points::fit_points;
 pub(crate) use silhouette::Silhouette;
