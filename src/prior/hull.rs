@@ -11,7 +11,8 @@
 //! vehicle pixels pass it by, so that every mask is filled. Measured points, where there are some, pull it to them.
 
 use super::volume::{
-    Field, Silhouette, estimate_box, fill_masks, fit_points, inside_all, inside_box, march, place_box,
+    Field, Silhouette, estimate_box, fill_masks, fit_points, hold_masks, inside_all, inside_box, march,
+    place_box,
 };
 use super::{DepthPrior, Geometry, VehicleBox};
 use crate::error::{Error, Result};
@@ -65,9 +66,12 @@ impl DepthPrior for HullPrior {
             fill_masks(&mut field, Some(&hull), views)
         });
         context.report("prior", 0.55)?;
-        // Last: where both speak, a measurement is worth more than what a mask demands at least.
-        let points =
-            context.parallel(|| self.cloud.as_ref().map(|c| fit_points(&mut field, Some(&hull), c.points())));
+        let points = self.cloud.as_ref().map(|cloud| {
+            context.parallel(|| {
+                let held = hold_masks(&field, views);
+                fit_points(&mut field, Some(&hull), cloud.points(), &held)
+            })
+        });
         context.report("prior", 0.6)?;
         let mut depths = Vec::with_capacity(views.len());
         for (i, view) in views.iter().enumerate() {

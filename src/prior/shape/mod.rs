@@ -12,7 +12,7 @@ pub mod lattice;
 mod network;
 
 use super::photo::fit_photographs;
-use super::volume::{Field, Silhouette, denied, fill_masks, fit_points, inside_both, march};
+use super::volume::{Field, Silhouette, denied, fill_masks, fit_points, hold_masks, inside_both, march};
 use super::{DepthPrior, Geometry, HullPrior, VehicleBox};
 use crate::error::Result;
 use crate::progress::Context;
@@ -92,9 +92,12 @@ impl DepthPrior for ShapePrior {
         };
         context.report("prior", 0.7)?;
         let masks = context.parallel(|| fill_masks(&mut field, Some(&hull), views));
-        // Last: where both speak, a measurement is worth more than what a mask demands at least.
-        let points =
-            context.parallel(|| self.cloud.as_ref().map(|c| fit_points(&mut field, Some(&hull), c.points())));
+        let points = self.cloud.as_ref().map(|cloud| {
+            context.parallel(|| {
+                let held = hold_masks(&field, views);
+                fit_points(&mut field, Some(&hull), cloud.points(), &held)
+            })
+        });
         context.report("prior", 0.8)?;
         let mut depths = Vec::with_capacity(views.len());
         for (i, view) in views.iter().enumerate() {

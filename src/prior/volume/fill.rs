@@ -73,7 +73,10 @@ pub(crate) fn fill_masks(field: &mut Field, hull: Option<&Field>, views: &[View]
     let grids: Vec<Grid> = views.iter().map(|view| Grid::of(&view.camera, middle)).collect();
     let samples: Vec<Sample> = (0..views.len())
         .into_par_iter()
-        .flat_map_iter(|i| samples(i, views[i].mask.as_ref().expect("hull views have masks"), grids[i].step))
+        .flat_map_iter(|i| {
+            let (mask, step) = (views[i].mask.as_ref().expect("hull views have masks"), grids[i].step);
+            samples(i, mask, step, EDGE_SAMPLES * step, Some(INNER_SAMPLES * step))
+        })
         .collect();
     let widest = grids.iter().map(|grid| grid.spacing).fold(0.0, f64::max);
     let spacing = (NODE_SPACING * widest).clamp(FINEST_M, COARSEST_M) as f32;
@@ -99,6 +102,26 @@ pub(crate) fn fill_masks(field: &mut Field, hull: Option<&Field>, views: &[View]
         missed = passing(field, &rays, &again);
     }
     Filled { uncovered_before, uncovered_after: part(field, &missed) }
+}
+
+/// Pulls that hold `field` where the silhouettes' edges need it, so that other evidence does not uncover them:
+/// each edge's ray must stay inside somewhere, and stays so most easily where it is deepest.
+pub(crate) fn hold_masks(field: &Field, views: &[View]) -> Vec<Pull> {
+    let (low, high) = field.bounds();
+    let middle = (0.5 * (low + high)).as_dvec3();
+    let pull = |(view, sample): (&View, Sample)| {
+        let point = Rays::of(view).deepest(field, sample.u, sample.v)?;
+        Some(Pull { point, target: 0.0, wish: Wish::AtLeast, weight: 1.0 })
+    };
+    views
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(|(i, view)| {
+            let step = Grid::of(&view.camera, middle).step;
+            let mask = view.mask.as_ref().expect("hull views have masks");
+            samples(i, mask, step, step, None).into_iter().filter_map(move |s| pull((view, s)))
+        })
+        .collect()
 }
 
 /// How far apart the pixels are that are looked at.
@@ -147,9 +170,8 @@ struct Sample {
     pixels: f64,
 }
 
-/// Pixels of the vehicle, more of them near its edge.
-fn samples(view: usize, mask: &Mask, step: usize) -> Vec<Sample> {
-    let (band, inner_step) = (EDGE_SAMPLES * step, INNER_SAMPLES * step);
+/// Vehicle pixels nearer to the edge than `band` at every `step`, others at every `inner`.
+fn samples(view: usize, mask: &Mask, step: usize, band: usize, inner: Option<usize>) -> Vec<Sample> {
     let (width, height) = (mask.width() as usize, mask.height() as usize);
     let vehicle = |u: usize, v: usize| mask.labels()[v * width + u] == Label::Vehicle;
     // Beyond the picture's border nothing is known, and nothing ends there.
@@ -163,8 +185,8 @@ fn samples(view: usize, mask: &Mask, step: usize) -> Vec<Sample> {
         for u in (0..width).step_by(step).filter(|&u| vehicle(u, v)) {
             if near_edge(u, v) {
                 out.push(Sample { view, u, v, pixels: (step * step) as f64 });
-            } else if u.is_multiple_of(inner_step) && v.is_multiple_of(inner_step) {
-                out.push(Sample { view, u, v, pixels: (inner_step * inner_step) as f64 });
+            } else if let Some(inner) = inner.filter(|i| u.is_multiple_of(*i) && v.is_multiple_of(*i)) {
+                out.push(Sample { view, u, v, pixels: (inner * inner) as f64 });
             }
         }
     }
@@ -225,9 +247,10 @@ mod tests {
         let filled = fill_masks(&mut field, Some(&hull), &views);
         assert!(filled.uncovered_before > 0.1, "{filled:?}");
         assert!(filled.uncovered_after < 0.2 * filled.uncovered_before, "{filled:?}");
-        let rim = field.sample(Vec3::new(0.78, 0.0, 0.0));
-        // Pixels are 33 mm wide; half of one is left to the surfels, and the lattice is as coarse.
-        assert!(rim > -0.04, "{rim}");
+        // Where the rays of the edge touch a ball: a fifth of its radius towards the camera, four metres away.
+        let rim = field.sample(0.78 * Vec3::new(0.98, -0.2, 0.0));
+        // Pixels are 33 mm wide; half of one is left to the surfels.
+        assert!(rim > -0.025, "{rim}");
         // What the view sees in the middle of the mask stays where it was.
         let front = field.sample(Vec3::new(0.0, -0.74, 0.0));
         assert!(front.abs() < 1e-3, "{front}");

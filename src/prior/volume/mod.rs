@@ -12,7 +12,7 @@ pub mod silhouette;
 pub use extent::{estimate_box, inside_all, inside_both, inside_box, place_box, whereabouts};
 pub(crate) use field::Field;
 pub use fill::Filled;
-pub(crate) use fill::{denied, fill_masks};
+pub(crate) use fill::{denied, fill_masks, hold_masks};
 pub use points::PointFit;
 pub(crate) use points::fit_points;
 pub use silhouette::Silhouette;

@@ -38,8 +38,14 @@ pub struct PointFit {
 }
 
 /// Bends `field` until its surface passes through `points`, vehicle frame, metres, all finite. `hull` says
-/// where the vehicle can be at all, where that is known better than by the field itself.
-pub(crate) fn fit_points(field: &mut Field, hull: Option<&Field>, points: &[[f32; 3]]) -> PointFit {
+/// where the vehicle can be at all, where that is known better than by the field itself; `held` is what the
+/// points are not to undo.
+pub(crate) fn fit_points(
+    field: &mut Field,
+    hull: Option<&Field>,
+    points: &[[f32; 3]],
+    held: &[Pull],
+) -> PointFit {
     let bound: &Field = hull.unwrap_or(field);
     let inside: Vec<Vec3> = points
         .par_iter()
@@ -49,7 +55,10 @@ pub(crate) fn fit_points(field: &mut Field, hull: Option<&Field>, points: &[[f32
     let pulls = thinned(&inside);
     let before_m = median_distance(field, &pulls);
     let ceiling = hull.map(|hull| Ceiling { hull, slack: 0.0 });
-    relax(field, ceiling, &pulls, &RELAXATION);
+    let together: Vec<Pull> = pulls.iter().chain(held).copied().collect();
+    if !pulls.is_empty() {
+        relax(field, ceiling, &together, &RELAXATION);
+    }
     PointFit {
         used: inside.len(),
         outside: points.len() - inside.len(),
@@ -110,7 +119,7 @@ mod tests {
         let mut points = flank(1000);
         points.extend([[0.0, -0.95, 0.0], [50.0, 0.0, 0.0], [1e30, -1e30, 3.0], [f32::MAX; 3]]);
         let mut field = slab();
-        let fit = fit_points(&mut field, None, &points);
+        let fit = fit_points(&mut field, None, &points, &[]);
         assert_eq!((fit.used, fit.outside), (1000, 4));
         assert!((fit.before_m - 0.2).abs() < 0.01 && fit.after_m < 0.01, "{fit:?}");
         assert!(field.sample(glam::Vec3::new(0.1, 0.6, 0.1)).abs() < 0.02);
@@ -119,7 +128,7 @@ mod tests {
     #[test]
     fn millions_of_one_point_are_one_point() {
         let mut field = slab();
-        let fit = fit_points(&mut field, None, &vec![[0.3, -0.6, 0.2]; 10_000_000]);
+        let fit = fit_points(&mut field, None, &vec![[0.3, -0.6, 0.2]; 10_000_000], &[]);
         assert_eq!(fit.used, 10_000_000);
         assert!(field.values().iter().all(|v| v.is_finite()) && fit.after_m < fit.before_m);
     }
@@ -127,7 +136,7 @@ mod tests {
     #[test]
     fn points_that_are_all_elsewhere_change_nothing() {
         let mut field = slab();
-        let fit = fit_points(&mut field, None, &[[0.0, 9.0, 0.0]]);
+        let fit = fit_points(&mut field, None, &[[0.0, 9.0, 0.0]], &[]);
         assert_eq!((fit.used, fit.before_m, fit.after_m), (0, 0.0, 0.0));
         assert_eq!(field.values(), slab().values());
     }

@@ -63,7 +63,8 @@ pub(crate) struct Relaxation {
     pub(crate) coarsest: f32,
     /// No level is finer than this, metres.
     pub(crate) finest: f32,
-    /// A level is left out, and all finer ones, where occupied cells hold fewer pulls than this on average.
+    /// A level is left out, and all finer ones, where occupied cells hold fewer exact pulls than this on
+    /// average.
     pub(crate) pulls_per_cell: f32,
     /// Residuals well beyond this are taken for errors, metres. A level whose residuals are mostly larger uses
     /// their own spread: before the first bend all pulls look wrong.
@@ -163,11 +164,12 @@ fn spread(pulls: &[Pull], left: &[f64]) -> f64 {
     1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Pulls in cells of this size, on average over the cells that hold any.
+/// Exact pulls in cells of this size, on average over the cells that hold any.
 fn pulls_per_cell(pulls: &[Pull], size: f32) -> f32 {
+    let exact = || pulls.iter().filter(|p| p.wish == Wish::Exactly);
     let cell = |p: &Pull| (Vec3::new(p.point.x, p.point.y.abs(), p.point.z) / size).floor().as_ivec3();
-    let occupied: HashSet<_> = pulls.iter().map(cell).collect();
-    pulls.len() as f32 / occupied.len().max(1) as f32
+    let occupied: HashSet<_> = exact().map(cell).collect();
+    exact().count() as f32 / occupied.len().max(1) as f32
 }
 
 /// The nodes of a lattice near the pulls; all others keep their value.
