@@ -1,11 +1,11 @@
 //! The learned prior: the hull of the silhouettes, corrected by what vehicles look like.
 //!
 //! A few silhouettes at one height carve a hull that is too fat, but how fat is predictable from where on the
-//! vehicle one looks. A small network that was trained on procedural vehicles only ([`network`]) turns the hull on
+//! vehicle one looks. A small network that was trained on procedural vehicles only (`network`) turns the hull on
 //! a coarse lattice over half the vehicle ([`lattice`]) into signed distance to the vehicle's surface, with an
 //! uncertainty. It is one surface for all views and their mirrored twins: nothing has to be fused. Where the network
 //! is unsure the surface stays nearer to the hull, and nowhere it leaves the hull. Then it moves to where the
-//! photographs agree ([`super::photo`]), it yields where masks are not filled, and at last it moves to measured points,
+//! photographs agree (`prior::photo`), it yields where masks are not filled, and at last it moves to measured points,
 //! where there are some.
 
 pub mod lattice;
@@ -54,7 +54,7 @@ pub struct ShapePrior {
     pub size: Option<[f64; 3]>,
     /// Points measured on the vehicle, where there are some.
     pub cloud: Option<Cloud>,
-    /// Whether the surface is also moved to where the photographs agree, see [`super::photo`].
+    /// Whether the surface is also moved to where the photographs agree, see `prior::photo`.
     pub photo: bool,
     /// Grid spacing, metres, where a coarser one than the finest useful one will do.
     pub voxel_m: Option<f64>,

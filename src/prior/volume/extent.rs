@@ -170,7 +170,7 @@ pub fn inside_box(vehicle_box: &VehicleBox, p: Vec3) -> f32 {
         .fold(f32::INFINITY, f32::min)
 }
 
-/// All silhouettes' verdict: how far inside all cones; below [`FAR_OUTSIDE_M`] some value below it.
+/// All silhouettes' verdict: how far inside all cones; far outside, 1 m, some value below that.
 pub fn inside_all(silhouettes: &[Silhouette], p: Vec3) -> f32 {
     let mut least = f32::INFINITY;
     for silhouette in silhouettes {
