@@ -62,6 +62,7 @@ pub(crate) fn reconstruct<'py>(
         budget_s: budget,
         threads,
         points,
+        ..Options::default()
     };
     // Before the pixels are copied.
     options.validate().map_err(|e| from_library(py, e))?;
