@@ -606,10 +606,10 @@ struct Options : vg_options {
     Options() noexcept : vg_options{} { vg_options_init(this, sizeof(vg_options)); }
 
     /// Measured points, metres, vehicle frame: lent, and copied by the call. A temporary is refused.
-    void lend_cloud(const std::vector<std::array<float, 3>> &points) noexcept {
+    void lend_cloud(const std::vector<std::array<float, 3>> &measured) noexcept {
         static_assert(sizeof(std::array<float, 3>) == 3 * sizeof(float), "points lie without gaps");
-        cloud = points.empty() ? nullptr : points.front().data();
-        cloud_count = points.size();
+        cloud = measured.empty() ? nullptr : measured.front().data();
+        cloud_count = measured.size();
     }
     void lend_cloud(const std::vector<std::array<float, 3>> &&) = delete;
 };

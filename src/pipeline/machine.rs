@@ -15,7 +15,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// Pieces of work a second on one thread of the machine that the cost model was measured on.
-const REFERENCE_RATE: f64 = 22_000.0;
+const REFERENCE_RATE: f64 = 60_000.0;
 
 /// Pieces per thread and measurement, and measurements of each kind. The fastest counts: whatever else runs can only
 /// slow the others down, and how much will differ by the time it matters.
