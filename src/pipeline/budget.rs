@@ -1,4 +1,4 @@
-//! The best reconstruction that fits into the caller's time: candidates in order of measured quality, the first whose
+//! The best reconstruction that fits into the caller's time: candidates in order of expected quality, the first whose
 //! predicted time fits. What is chosen are ordinary options, so that a run can be repeated exactly without a budget.
 
 use super::cost::{self, Load};

@@ -97,7 +97,7 @@ fn text(folder: &Path, split: &split::Split, shape: &Measured, given: &Measured)
         ),
         row("silhouettes (--prior shape)", shape),
         row("the scene (--prior given)", given),
-        "The second row is a bound: it is given the true depth of the inputs. Of the first row there are now,".into(),
+        "The second row is given the true depth of the inputs. Of the first row there are now,".into(),
         format!("in {}:", folder.display()),
         files.join("\n"),
     ]
