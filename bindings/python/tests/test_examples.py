@@ -62,7 +62,7 @@ def test_quickstart_takes_a_folder_without_a_split(tmp_path: Path) -> None:
 def test_a_colmap_model_becomes_an_asset(tmp_path: Path, unseen: vg.Scene) -> None:
     pytest.importorskip("pycolmap")
     said = run("colmap_to_asset.py", cwd=tmp_path)
-    assert unseen_psnr(tmp_path / "car.ply", unseen) > 22.4
+    assert unseen_psnr(tmp_path / "car.ply", unseen) > 24.9
     # Length and height from silhouettes; the width is that of the unseen side's mirror image.
     assert said.startswith("car.ply: Gaussians(")
 
@@ -80,7 +80,7 @@ def test_a_colmap_model_that_pycolmap_wrote_reads_alike_here_and_there(tmp_path:
     made = vg.reconstruct(scene.images, scene.masks, scene.cameras)
     theirs = vg.Gaussians.load_ply(tmp_path / "a.ply")
     assert abs(len(theirs) - len(made.gaussians)) < 0.001 * len(theirs)
-    assert abs(unseen_psnr(tmp_path / "a.ply", unseen) - 22.73) < 0.3
+    assert abs(unseen_psnr(tmp_path / "a.ply", unseen) - 25.35) < 0.3
 
 
 def test_the_unseen_side_comes_through_ctypes_alone(tmp_path: Path, unseen: vg.Scene) -> None:
@@ -89,4 +89,4 @@ def test_the_unseen_side_comes_through_ctypes_alone(tmp_path: Path, unseen: vg.S
     for name, image, mask in zip(unseen.names, unseen.images, unseen.masks, strict=True):
         with Image.open(tmp_path / "out" / name) as picture:
             assert psnr(np.asarray(picture), on_white(image, mask)) > 21
-    assert unseen_psnr(tmp_path / "out" / "car.ply", unseen) > 22.4
+    assert unseen_psnr(tmp_path / "out" / "car.ply", unseen) > 24.9
