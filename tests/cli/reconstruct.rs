@@ -10,7 +10,7 @@ fn views_are_known_by_path_by_file_name_and_by_stem() {
     let mixed = "images/000.png,001.png,002,images/003.png";
     succeed(
         at,
-        &format!("reconstruct transforms.json --views {mixed} --prior hull -o {{}}/new/folder/a.ply"),
+        &format!("reconstruct transforms.json --views {mixed} --prior shape -o {{}}/new/folder/a.ply"),
     );
     assert!(fs::read(at.join("new/folder/a.ply")).unwrap() == fs::read(asset()).unwrap());
 }
