@@ -206,7 +206,7 @@ impl Judge<'_> {
         let (sum, n) = chosen.fold((0.0, 0usize), |(sum, n), (sample, meeting)| {
             let i = self.views[sample.view].camera.intrinsics;
             let z = f64::from((meeting.t * sample.direction.z).max(0.05));
-            let pixels = (deficit(meeting) - f64::from(sample.margin)).max(0.0) * i.fx.min(i.fy) / z;
+            let pixels = (deficit(meeting) - f64::from(sample.margin)).max(0.0) * i.smaller_focal() / z;
             (sum + pixels.min(MOST_EDGE_ERROR_PX), n + 1)
         });
         if n > 0 { sum / n as f64 } else { 0.0 }

@@ -40,7 +40,7 @@ pub(super) fn edges(views: &[View], middle: DVec3) -> Vec<Sample> {
         let square = (v.camera.width / 16).max(1);
         let pixels = edge_pixels(mask);
         let i = v.camera.intrinsics;
-        let margin = MARGIN_PX * (middle - v.camera.center()).length() / i.fx.min(i.fy);
+        let margin = MARGIN_PX * (middle - v.camera.center()).length() / i.smaller_focal();
         thinned(&pixels, most)
             .map(|[x, y]| Sample {
                 view,

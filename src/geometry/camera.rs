@@ -22,6 +22,11 @@ pub struct Intrinsics {
 }
 
 impl Intrinsics {
+    /// The smaller focal length, pixels: at planar depth z a pixel is z over this wide, in its wider direction.
+    pub fn smaller_focal(&self) -> f64 {
+        self.fx.min(self.fy)
+    }
+
     /// Pixel coordinates of normalised ones (x/z, y/z).
     pub fn pixel_from_normalized(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.fx * x + self.cx, self.fy * y + self.cy]

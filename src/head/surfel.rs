@@ -129,7 +129,7 @@ fn surfel(view: &View, geometry: &Geometry, i: usize, pixel: usize) -> Option<(G
     let tilt = normal.cross(direction).cross(normal);
     let along = tilt.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
     let across = normal.cross(along);
-    let focal = camera.intrinsics.fx.min(camera.intrinsics.fy) as f32;
+    let focal = camera.intrinsics.smaller_focal() as f32;
     let size = FOOTPRINT_SIGMA_PX * z * ray.length() / focal;
 
     let vehicle_from_camera = camera.vehicle_from_camera.rotation.as_mat3();

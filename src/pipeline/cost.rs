@@ -5,6 +5,7 @@
 
 use super::machine::Machine;
 use super::options::{Calibrate, Options, PriorChoice};
+use super::plan;
 use crate::prior::hull::FINEST_VOXEL_M;
 use crate::relight::Relight;
 use crate::symmetry::SymmetryMode;
@@ -60,11 +61,7 @@ fn cost(load: &Load, options: &Options) -> Cost {
     let views = load.views.min(options.max_views.unwrap_or(usize::MAX)) as f64;
     let share = options.resolution * options.resolution;
     let (pixels, vehicle) = (views * load.pixels * share, views * load.vehicle * share);
-    let prior = match options.prior {
-        PriorChoice::Auto if load.has_depth => PriorChoice::Given,
-        PriorChoice::Auto => PriorChoice::Shape,
-        chosen => chosen,
-    };
+    let prior = plan::prior(options.prior, load.has_depth);
     let mut cost = Cost::default();
     // Threads, allocation, what no stage accounts for.
     cost.add(2.0, 0.0);

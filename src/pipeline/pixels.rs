@@ -72,8 +72,7 @@ impl Judge<'_> {
         {
             return Verdict::Edge;
         }
-        let tolerance =
-            SURFACE_FOOTPRINTS * z / view.camera.intrinsics.fx.min(view.camera.intrinsics.fy) as f32;
+        let tolerance = SURFACE_FOOTPRINTS * z / view.camera.intrinsics.smaller_focal() as f32;
         if !self.keep.floaters && is_floating(depth, &self.geometry.normals[i], u, v, tolerance) {
             return Verdict::Floating;
         }

@@ -52,10 +52,10 @@ fn same_camera(a: &View, b: &View) -> bool {
         && Camera { vehicle_from_camera: pa, ..b.camera } == a.camera
 }
 
-/// The depth source for these views.
-pub(super) fn prior(views: &[View], options: &Options) -> PriorChoice {
-    match options.prior {
-        PriorChoice::Auto if views.iter().all(|v| v.depth.is_some()) => PriorChoice::Given,
+/// The depth source that was asked for, for views that all have depth or not.
+pub(super) fn prior(asked: PriorChoice, all_have_depth: bool) -> PriorChoice {
+    match asked {
+        PriorChoice::Auto if all_have_depth => PriorChoice::Given,
         PriorChoice::Auto => PriorChoice::Shape,
         chosen => chosen,
     }

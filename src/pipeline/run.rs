@@ -100,7 +100,8 @@ pub fn reconstruct_on<'a>(
         Some(moved) => cloud.in_frame(&moved.vehicle_from_corrected),
         None => cloud.clone(),
     });
-    let prior = chosen_prior(plan::prior(&views, options), cloud, options);
+    let source = plan::prior(options.prior, views.iter().all(|v| v.depth.is_some()));
+    let prior = chosen_prior(source, cloud, options);
     let mut geometry = prior.estimate(&views, &context)?;
     geometry.find_normals(&views, &context);
     if let Some(cloud) = &scene.cloud {

@@ -11,8 +11,7 @@
 //! vehicle pixels pass it by, so that every mask is filled. Measured points, where there are some, pull it to them.
 
 use super::volume::{
-    Field, Silhouette, estimate_box, fill_masks, fit_points, hold_masks, inside_all, inside_box, march,
-    place_box,
+    Field, Silhouette, estimate_box, fill_masks, fit_cloud, inside_all, inside_box, march, place_box,
 };
 use super::{DepthPrior, Geometry, VehicleBox};
 use crate::error::{Error, Result};
@@ -66,12 +65,7 @@ impl DepthPrior for HullPrior {
             fill_masks(&mut field, Some(&hull), views)
         });
         context.report("prior", 0.55)?;
-        let points = self.cloud.as_ref().map(|cloud| {
-            context.parallel(|| {
-                let held = hold_masks(&field, views);
-                fit_points(&mut field, Some(&hull), cloud.points(), &held)
-            })
-        });
+        let points = context.parallel(|| fit_cloud(&mut field, &hull, views, self.cloud.as_ref()));
         context.report("prior", 0.6)?;
         let mut depths = Vec::with_capacity(views.len());
         for (i, view) in views.iter().enumerate() {

@@ -9,7 +9,7 @@
 use super::Geometry;
 use super::normals::normals;
 use super::volume::points::median_distance;
-use super::volume::relax::{Ceiling, Pull, Relaxation, Wish, relax};
+use super::volume::relax::{Ceiling, HULL_SLACK_M, Pull, Relaxation, Wish, relax};
 use super::volume::{Field, march};
 use crate::error::Result;
 use crate::scene::View;
@@ -53,9 +53,6 @@ const THICKNESS_M: f32 = 0.10;
 const RELAXATION: Relaxation =
     Relaxation { coarsest: 0.24, finest: 0.06, pulls_per_cell: 0.0, scale: 0.02, stiffness: 0.3, fade: 0.2 };
 
-/// The hull may be this much too thin, metres: masks and poses are not exact.
-const HULL_SLACK_M: f32 = 0.02;
-
 /// What the photographs said.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PhotoFit {
@@ -98,7 +95,7 @@ fn pulls(views: &[View], geometry: &Geometry) -> (usize, Vec<Pull>) {
                 let (u, v) = ((pixel % width) as u32, (pixel / width) as u32);
                 let z = geometry.depths[i].get(u, v)?;
                 let normal = rotation * geometry.normals[i][pixel];
-                let footprint = z / view.camera.intrinsics.fx.min(view.camera.intrinsics.fy) as f32;
+                let footprint = z / view.camera.intrinsics.smaller_focal() as f32;
                 let patch = Patch::new(view.lift(u, v, z), normal, footprint);
                 sweep(&patch, i, &observers, &pictures)
             })

@@ -12,7 +12,8 @@ pub mod lattice;
 mod network;
 
 use super::photo::fit_photographs;
-use super::volume::{Field, Silhouette, denied, fill_masks, fit_points, hold_masks, inside_both, march};
+use super::volume::relax::HULL_SLACK_M;
+use super::volume::{Field, Silhouette, denied, fill_masks, fit_cloud, inside_both, march};
 use super::{DepthPrior, Geometry, HullPrior, VehicleBox};
 use crate::error::Result;
 use crate::progress::Context;
@@ -33,9 +34,6 @@ const HALF_TRUSTED_M: f32 = 0.05;
 
 /// Corrections with smaller expected errors are applied in full, those with larger ones not at all, metres.
 const TRUSTED_M: std::ops::Range<f32> = 0.10..0.30;
-
-/// The hull may be this much too thin, metres: masks and poses are not exact.
-const HULL_SLACK_M: f32 = 0.02;
 
 /// A ray of a vehicle pixel that passes the predicted surface by farther than this, and yet meets the hull, shows
 /// something that the network does not know, metres.
@@ -92,12 +90,7 @@ impl DepthPrior for ShapePrior {
         };
         context.report("prior", 0.7)?;
         let masks = context.parallel(|| fill_masks(&mut field, Some(&hull), views));
-        let points = self.cloud.as_ref().map(|cloud| {
-            context.parallel(|| {
-                let held = hold_masks(&field, views);
-                fit_points(&mut field, Some(&hull), cloud.points(), &held)
-            })
-        });
+        let points = context.parallel(|| fit_cloud(&mut field, &hull, views, self.cloud.as_ref()));
         context.report("prior", 0.8)?;
         let mut depths = Vec::with_capacity(views.len());
         for (i, view) in views.iter().enumerate() {
@@ -203,7 +196,7 @@ impl Shape {
                 let node = lattice.node(i, row / nz, row % nz);
                 let near =
                     places.iter().map(|p| p.distance_squared(node)).fold(f32::INFINITY, f32::min).sqrt();
-                let kept = ((near - GIVEN_UP_M.start) / (GIVEN_UP_M.end - GIVEN_UP_M.start)).clamp(0.0, 1.0);
+                let kept = way_through(&GIVEN_UP_M, near);
                 *distance = hull + kept * (*distance - hull);
             }
         });
@@ -213,7 +206,12 @@ impl Shape {
 /// The part of a correction that is applied: where the network does not know what it sees, the hull at least is
 /// what the silhouettes say.
 fn trust(error: f32) -> f32 {
-    1.0 - ((error - TRUSTED_M.start) / (TRUSTED_M.end - TRUSTED_M.start)).clamp(0.0, 1.0)
+    1.0 - way_through(&TRUSTED_M, error)
+}
+
+/// 0 before the range, 1 behind it, linear between.
+fn way_through(range: &std::ops::Range<f32>, x: f32) -> f32 {
+    ((x - range.start) / (range.end - range.start)).clamp(0.0, 1.0)
 }
 
 /// Channels as `training/shape/network.py` has them: hull slices along |y|, x, z, and the view numbers, constant.

@@ -21,13 +21,10 @@ impl Field {
     /// Evaluates `inside` at the points of a grid of spacing `voxel` over the box `low..high`, which is
     /// symmetric in y, and at their mirror points, keeping the smaller value (the mirrored twins carve too).
     pub(crate) fn carve(low: DVec3, high: DVec3, voxel: f64, inside: impl Fn(Vec3) -> f32 + Sync) -> Self {
-        let size: [usize; 3] = std::array::from_fn(|k| ((high[k] - low[k]) / voxel).ceil() as usize + 1);
-        let [nx, ny, nz] = size;
-        let half_width = 0.5 * (ny - 1) as f64 * voxel;
-        let low = Vec3::new(low.x as f32, -half_width as f32, low.z as f32);
-        let voxel = voxel as f32;
-        let mut values = vec![0.0f32; nx * ny * nz];
-        values.par_chunks_mut(nx * ny).enumerate().for_each(|(k, slab)| {
+        let mut field = Self::empty(low, high, voxel);
+        let [nx, ny, _] = field.size;
+        let (low, voxel) = (field.low, field.voxel);
+        field.values.par_chunks_mut(nx * ny).enumerate().for_each(|(k, slab)| {
             for (j, row) in slab.chunks_exact_mut(nx).enumerate() {
                 for (i, value) in row.iter_mut().enumerate() {
                     let p = low + voxel * Vec3::new(i as f32, j as f32, k as f32);
@@ -43,8 +40,7 @@ impl Field {
                 }
             }
         });
-        debug_assert_eq!(values.len(), nx * ny * nz);
-        Self { low, voxel, size, values }
+        field
     }
 
     /// Evaluates `inside`, which is its own mirror image, at the points of the same grid.
@@ -55,17 +51,7 @@ impl Field {
         inside: impl Fn(Vec3) -> f32 + Sync,
     ) -> Self {
         let mut field = Self::empty(low, high, voxel);
-        let [nx, ny, _] = field.size;
-        let (low, voxel) = (field.low, field.voxel);
-        field.values.par_chunks_mut(nx * ny).enumerate().for_each(|(k, slab)| {
-            for j in 0..ny.div_ceil(2) {
-                for i in 0..nx {
-                    let p = low + voxel * Vec3::new(i as f32, j as f32, k as f32);
-                    slab[j * nx + i] = inside(p).clamp(-CLAMP_M, CLAMP_M);
-                }
-                slab.copy_within(j * nx..(j + 1) * nx, (ny - 1 - j) * nx);
-            }
-        });
+        field.adjust(|p, _| inside(p).clamp(-CLAMP_M, CLAMP_M));
         field
     }
 
@@ -108,8 +94,10 @@ impl Field {
                     let p = low + voxel * Vec3::new(i as f32, j as f32, k as f32);
                     let p = Vec3::new(p.x, p.y.abs(), p.z);
                     let (a, b) = (j * nx + i, (ny - 1 - j) * nx + i);
-                    let both = (new(p, slab[a]), new(p, slab[b]));
-                    (slab[a], slab[b]) = both;
+                    let one = new(p, slab[a]);
+                    // Values that are each other's mirror image stay so, for half the work.
+                    let other = if slab[b] == slab[a] { one } else { new(p, slab[b]) };
+                    (slab[a], slab[b]) = (one, other);
                 }
             }
         });

@@ -11,8 +11,7 @@ use super::relax::{Ceiling, Pull, Relaxation, Wish, relax};
 use crate::geometry::Camera;
 use crate::scene::View;
 use crate::scene::mask::{Label, Mask};
-use glam::DVec3;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -135,7 +134,7 @@ struct Grid {
 impl Grid {
     /// For a vehicle around `middle`.
     fn of(camera: &Camera, middle: DVec3) -> Self {
-        let footprint = (camera.center() - middle).length() / camera.intrinsics.fx.min(camera.intrinsics.fy);
+        let footprint = (camera.center() - middle).length() / camera.intrinsics.smaller_focal();
         let step = (SAMPLE_M / footprint).round().clamp(1.0, f64::from(camera.width)) as usize;
         Self { step, spacing: step as f64 * footprint }
     }

@@ -68,7 +68,7 @@ impl Rays {
 
     /// Width of a pixel at planar depth z, metres.
     pub(super) fn footprint(&self, z: f32) -> f32 {
-        z / self.intrinsics.fx.min(self.intrinsics.fy) as f32
+        z / self.intrinsics.smaller_focal() as f32
     }
 
     /// The first point of a pixel's ray inside the field.
@@ -81,11 +81,11 @@ impl Rays {
         let Meeting::Surface(first) = self.meet(field, u, v) else { return None };
         let direction = self.direction(u, v);
         let step = field.voxel() / direction.length();
-        let inside = |k: &usize| field.sample(self.origin + (first + *k as f32 * step) * direction);
+        let point = |k: usize| self.origin + (first + k as f32 * step) * direction;
         // A field may be positive up to its border, where samples repeat.
-        let deepest =
-            (1..1000usize).take_while(|k| inside(k) > 0.0).max_by(|a, b| inside(a).total_cmp(&inside(b)));
-        Some(self.origin + (first + deepest.unwrap_or(0) as f32 * step) * direction)
+        let stretch = (1..1000).map(|k| (k, field.sample(point(k)))).take_while(|(_, inside)| *inside > 0.0);
+        let deepest = stretch.max_by(|a, b| a.1.total_cmp(&b.1));
+        Some(point(deepest.map_or(0, |(k, _)| k)))
     }
 
     /// With z = 1 in the camera frame.

@@ -5,7 +5,9 @@
 //! their neighbours ([`super::relax`]).
 
 use super::field::Field;
+use super::fill::hold_masks;
 use super::relax::{Ceiling, Pull, Relaxation, Wish, relax};
+use crate::scene::{Cloud, View};
 use glam::Vec3;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -40,12 +42,7 @@ pub struct PointFit {
 /// Bends `field` until its surface passes through `points`, vehicle frame, metres, all finite. `hull` says
 /// where the vehicle can be at all, where that is known better than by the field itself; `held` is what the
 /// points are not to undo.
-pub(crate) fn fit_points(
-    field: &mut Field,
-    hull: Option<&Field>,
-    points: &[[f32; 3]],
-    held: &[Pull],
-) -> PointFit {
+fn fit_points(field: &mut Field, hull: Option<&Field>, points: &[[f32; 3]], held: &[Pull]) -> PointFit {
     let bound: &Field = hull.unwrap_or(field);
     let inside: Vec<Vec3> = points
         .par_iter()
@@ -65,6 +62,18 @@ pub(crate) fn fit_points(
         before_m,
         after_m: median_distance(field, &pulls),
     }
+}
+
+/// The same for the scene's cloud, if there is one; the masks that `field` fills stay filled.
+pub(crate) fn fit_cloud(
+    field: &mut Field,
+    hull: &Field,
+    views: &[View],
+    cloud: Option<&Cloud>,
+) -> Option<PointFit> {
+    let points = cloud?.points();
+    let held = hold_masks(field, views);
+    Some(fit_points(field, Some(hull), points, &held))
 }
 
 /// How far outside the field's grid a point is, metres.

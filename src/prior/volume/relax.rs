@@ -75,6 +75,9 @@ pub(crate) struct Relaxation {
     pub(crate) fade: f64,
 }
 
+/// A hull of silhouettes may be this much too thin, metres: masks and poses are not exact.
+pub(crate) const HULL_SLACK_M: f32 = 0.02;
+
 /// Values a field may not be raised above.
 #[derive(Clone, Copy)]
 pub(crate) struct Ceiling<'a> {

@@ -81,7 +81,7 @@ impl Silhouette {
                 outside = outside.max(distance);
             }
         }
-        let metres_per_pixel = p.z / self.intrinsics.fx.min(self.intrinsics.fy) as f32;
+        let metres_per_pixel = p.z / self.intrinsics.smaller_focal() as f32;
         (self.sample(u - 0.5, v - 0.5) - outside) * metres_per_pixel
     }
 

@@ -60,19 +60,20 @@ pub fn draw(size: DVec3, middle: DVec3, rng: &mut impl Rng) -> Vec<Camera> {
             }
             // No lens cuts what the plan wants whole.
             let f = if close { focal } else { focal.min(0.97 / needed) };
-            camera(center, aim, roll, f)
+            looking_at(aim, center, roll, f, (WIDTH, HEIGHT))
         })
         .collect()
 }
 
-fn camera(center: DVec3, aim: DVec3, roll: f64, focal: f64) -> Camera {
+/// A camera at `center` with its optical axis through `aim`, turned by `roll` radians about it.
+pub fn looking_at(aim: DVec3, center: DVec3, roll: f64, focal: f64, (width, height): (u32, u32)) -> Camera {
     let forward = (aim - center).normalize();
     let right = forward.cross(DVec3::Z).normalize();
     let down = forward.cross(right);
     let (s, c) = roll.sin_cos();
     let rotation = DMat3::from_cols(c * right + s * down, c * down - s * right, forward);
     let intrinsics =
-        Intrinsics { fx: focal, fy: focal, cx: 0.5 * f64::from(WIDTH), cy: 0.5 * f64::from(HEIGHT) };
-    Camera::pinhole(WIDTH, HEIGHT, intrinsics, Pose { rotation, translation: center })
+        Intrinsics { fx: focal, fy: focal, cx: 0.5 * f64::from(width), cy: 0.5 * f64::from(height) };
+    Camera::pinhole(width, height, intrinsics, Pose { rotation, translation: center })
         .expect("a valid camera")
 }

@@ -1,11 +1,12 @@
 //! A picture of vehicles of every class, shaded by the slope of their depth.
 
+use crate::cameras::looking_at;
 use crate::grid::Grid;
 use crate::vehicle::{self, CLASSES};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use image::{GrayImage, Luma};
 use std::path::Path;
-use vg::geometry::{Camera, Intrinsics, Pose};
+use vg::geometry::Camera;
 
 const SIZE: (u32, u32) = (240, 150);
 const PER_CLASS: u32 = 6;
@@ -17,7 +18,7 @@ pub fn draw(seed: u64, output: &Path) -> std::io::Result<()> {
             let mut rng = crate::random(seed, row * 100 + column as usize);
             let vehicle = vehicle::draw_class(*class, &mut rng);
             let grid = Grid::of(&vehicle, 0.025);
-            let camera = looking_at(&grid, 40.0 + 20.0 * f64::from(column));
+            let camera = camera(&grid, 40.0 + 20.0 * f64::from(column));
             let depth = grid.depth(&camera);
             for (x, y, shade) in shades(&camera, &depth) {
                 picture.put_pixel(column * SIZE.0 + x, row as u32 * SIZE.1 + y, Luma([shade]));
@@ -27,18 +28,13 @@ pub fn draw(seed: u64, output: &Path) -> std::io::Result<()> {
     picture.save(output).map_err(std::io::Error::other)
 }
 
-fn looking_at(grid: &Grid, azimuth: f64) -> Camera {
+/// From `azimuth` degrees, a little above.
+fn camera(grid: &Grid, azimuth: f64) -> Camera {
     let middle = 0.5 * (grid.low_inside + grid.high_inside).as_dvec3() * DVec3::new(1.0, 0.0, 1.0);
     let size = f64::from(grid.high_inside.x - grid.low_inside.x);
-    let distance = 2.2 * size;
-    let a = azimuth.to_radians();
-    let center = middle + DVec3::new(distance * a.cos(), distance * a.sin(), 0.35 * size);
-    let forward = (middle - center).normalize();
-    let right = forward.cross(DVec3::Z).normalize();
-    let rotation = DMat3::from_cols(right, forward.cross(right), forward);
-    let f = 1.75 * f64::from(SIZE.0);
-    let i = Intrinsics { fx: f, fy: f, cx: 0.5 * f64::from(SIZE.0), cy: 0.5 * f64::from(SIZE.1) };
-    Camera::pinhole(SIZE.0, SIZE.1, i, Pose { rotation, translation: center }).expect("a valid camera")
+    let (sin, cos) = azimuth.to_radians().sin_cos();
+    let center = middle + size * DVec3::new(2.2 * cos, 2.2 * sin, 0.35);
+    looking_at(middle, center, 0.0, 1.75 * f64::from(SIZE.0), SIZE)
 }
 
 /// Light from the upper left.
