@@ -61,7 +61,9 @@
  *            throws. Running out of memory aborts, as it does in most programs.
  *
  * Same bytes. The same input and the same options give the same bytes, with any number of threads, on the same
- *            processor family; other processors differ in the last bits. Times and memory in the report differ.
+ *            processor family; other processors differ in the last bits. Times and memory in the report differ. What
+ *            a budget leaves out depends on how fast the machine is; the report's settings, without the budget,
+ *            give the same bytes again.
  *
  * Versions.  Functions, enumerators and fields are added and never change. A struct that may grow begins with
  *            struct_size: call its _init function with sizeof, then set what you need. An older program's shorter
@@ -317,7 +319,7 @@ enum vg_symmetry
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * What no view observed is mirrored; what was observed much better on the other side gives way.
+     * What no view observed is mirrored; what the other side shows at 1.03 times the resolution gives way.
      */
     VG_SYMMETRY_AUTO = 0,
     /**
@@ -821,6 +823,16 @@ typedef struct vg_options {
      * How many points, at most 10000000; 0: none. Default 0.
      */
     size_t cloud_count;
+    /**
+     * Views are first resampled to this share of their width and height, above 0, at most 1. A `budget_s` may choose
+     * less. Default 1.
+     */
+    double resolution;
+    /**
+     * At most this many views are used, those that spread best around the vehicle; 0: all. A `budget_s` may choose
+     * fewer. Default 0.
+     */
+    size_t max_views;
 } vg_options;
 
 /**

@@ -42,7 +42,7 @@ pub enum vg_calibrate {
 #[repr(i32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum vg_symmetry {
-    /// What no view observed is mirrored; what was observed much better on the other side gives way.
+    /// What no view observed is mirrored; what the other side shows at 1.03 times the resolution gives way.
     Auto = 0,
     /// The side with more Gaussians replaces the other, whatever was observed there.
     Always = 1,
@@ -147,6 +147,12 @@ pub struct vg_options {
     pub cloud: *const f32,
     /// How many points, at most 10000000; 0: none. Default 0.
     pub cloud_count: usize,
+    /// Views are first resampled to this share of their width and height, above 0, at most 1. A `budget_s` may choose
+    /// less. Default 1.
+    pub resolution: f64,
+    /// At most this many views are used, those that spread best around the vehicle; 0: all. A `budget_s` may choose
+    /// fewer. Default 0.
+    pub max_views: usize,
 }
 
 unsafe impl Versioned for vg_options {
@@ -175,6 +181,8 @@ unsafe impl Versioned for vg_options {
             budget_s: 0.0,
             cloud: std::ptr::null(),
             cloud_count: 0,
+            resolution: 1.0,
+            max_views: 0,
         }
     }
 }
@@ -219,8 +227,8 @@ impl vg_options {
             check: read::flag("options.check", self.check)?,
             photo: read::flag("options.photo", self.photo)?,
             budget_s: (self.budget_s != 0.0).then_some(self.budget_s),
-            resolution: 1.0,
-            max_views: None,
+            resolution: self.resolution,
+            max_views: (self.max_views != 0).then_some(self.max_views),
             points: read::flag("options.points", self.points)?,
             threads: 0,
         })

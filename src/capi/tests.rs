@@ -47,7 +47,8 @@ fn layout_of_rust() -> String {
         }
         vg_options {
             struct_size context prior symmetry sh_degree keep check points vehicle_size progress progress_user log
-            log_user calibrate relight photo flags budget_s cloud cloud_count
+            log_user calibrate relight photo flags budget_s cloud cloud_count resolution
+            max_views
         }
         vg_render_options {
             struct_size context backend background background_color alpha depth_mode sh_degree antialiased blur

@@ -11,7 +11,8 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 /// Another view, or a mirror image, must show a place this much better before what was observed is given up for it.
-pub(super) const BETTER: f32 = 1.1;
+/// With nothing between, gaps open where one view's grid of Gaussians ends and another's begins.
+pub(super) const BETTER: f32 = 1.03;
 
 /// Two depths belong to one surface when they differ by less than this many pixel footprints.
 const SURFACE_FOOTPRINTS: f32 = 6.0;

@@ -36,6 +36,8 @@ pub struct InputError {
     pub psnr_db: f64,
     /// Mean over the used views: alpha >= 0.5 against the mask.
     pub silhouette_iou: f64,
+    /// The least over the used views: the part of the mask that is drawn with alpha >= 0.5, 0 to 1.
+    pub mask_covered: f64,
 }
 
 /// The box the prior worked in.

@@ -303,13 +303,14 @@ fn back_in_vehicle(
 /// The model drawn into the views it came from.
 fn input_error(gaussians: &Gaussians, views: &[View], context: &Context) -> Result<InputError> {
     let renderer = CpuRenderer::new();
-    let (mut psnr, mut iou) = (0.0, 0.0);
+    let mut error = InputError { psnr_db: 0.0, silhouette_iou: 0.0, mask_covered: 1.0 };
     for (i, view) in views.iter().enumerate() {
         context.report("check", i as f64 / views.len() as f64)?;
         let rendered =
             context.parallel(|| renderer.render(gaussians, &view.camera, &RenderOptions::default()))?;
-        psnr += metrics::psnr(&rendered.color, &metrics::on_white(view)) / views.len() as f64;
-        iou += metrics::silhouette_iou(&rendered.alpha, view) / views.len() as f64;
+        error.psnr_db += metrics::psnr(&rendered.color, &metrics::on_white(view)) / views.len() as f64;
+        error.silhouette_iou += metrics::silhouette_iou(&rendered.alpha, view) / views.len() as f64;
+        error.mask_covered = error.mask_covered.min(metrics::mask_covered(&rendered.alpha, view));
     }
-    Ok(InputError { psnr_db: psnr, silhouette_iou: iou })
+    Ok(error)
 }

@@ -1084,8 +1084,8 @@ fn options_of_an_older_program_have_the_defaults_of_what_came_later() {
     let make = calls::reconstruct;
     let expected = bytes(table.row(make, "as it is", |_| {}, Fine).handle("out_gaussians"));
     let first = FIRST_SIZES.iter().find(|(of, _)| *of == "vg_options").unwrap().1;
-    // Up to the reserved field, and to the middle of the cloud.
-    for size in [first, first + 8, first + 12, first + 16, first + 24, first + 36] {
+    // Up to the reserved field, to the middle of the cloud, to the resolution and behind it.
+    for size in [first, first + 8, first + 12, first + 16, first + 24, first + 36, first + 40, first + 48] {
         let older = |call: &mut Call| {
             call.lent("options").put("photo", 0, if size > first + 8 { 1 } else { 77 });
             call.lent("options").resize(size, 0);
@@ -1096,6 +1096,7 @@ fn options_of_an_older_program_have_the_defaults_of_what_came_later() {
         assert_eq!(settings["calibrate"], "auto");
         assert_eq!(settings["relight"], "auto");
         assert_eq!((settings["photo"].as_bool(), settings["budget_s"].is_null()), (Some(true), true));
+        assert_eq!((settings["resolution"].as_f64(), settings["max_views"].is_null()), (Some(1.0), true));
     }
 }
 
@@ -1107,6 +1108,8 @@ fn options_reach_the_library() {
             call.lent("options").put(name, 0, value);
         }
         call.lent("options").put("budget_s", 0, 1e6f64.to_bits());
+        call.lent("options").put("resolution", 0, 0.5f64.to_bits());
+        call.lent("options").put("max_views", 0, 1);
     };
     let done = table.row(calls::reconstruct, "nothing as it is", set, Fine);
     let told = report(done.handle("out_report"));
@@ -1115,6 +1118,8 @@ fn options_reach_the_library() {
     // The plan of a budget is told beside the settings that it chose.
     assert_eq!((settings["photo"].as_bool(), told["plan"]["budget_s"].as_f64()), (Some(false), Some(1e6)));
     assert!(told["calibration"].is_null() && told["relight"].is_null());
+    assert_eq!((settings["resolution"].as_f64(), settings["max_views"].as_u64()), (Some(0.5), Some(1)));
+    assert_eq!(told["views_used"].as_array().map(Vec::len), Some(1));
 }
 
 #[test]

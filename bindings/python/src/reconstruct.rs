@@ -25,7 +25,7 @@ type Points<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>);
 #[pyfunction]
 #[pyo3(signature = (
     images, masks, cameras, depths, *, prior, calibrate, symmetry, relight, photo, cloud, vehicle_size, sh_degree, keep,
-    check, points, budget, threads, names, progress
+    check, points, budget, resolution, max_views, threads, names, progress
 ))]
 pub(crate) fn reconstruct<'py>(
     py: Python<'py>,
@@ -45,6 +45,8 @@ pub(crate) fn reconstruct<'py>(
     check: bool,
     points: bool,
     budget: Option<f64>,
+    resolution: f64,
+    max_views: Option<usize>,
     threads: usize,
     names: Option<Vec<String>>,
     progress: Option<Py<PyAny>>,
@@ -60,9 +62,10 @@ pub(crate) fn reconstruct<'py>(
         check,
         photo,
         budget_s: budget,
+        resolution,
+        max_views,
         threads,
         points,
-        ..Options::default()
     };
     // Before the pixels are copied.
     options.validate().map_err(|e| from_library(py, e))?;

@@ -142,11 +142,13 @@ def test_options_are_those_of_the_extension_module(ellipsoid: Views, made: vg.Re
         "cloud": cloud,
         "check": False,
         "budget": 1e6,
+        "resolution": 0.75,
+        "max_views": 3,
     }
     ours, theirs = vg.reconstruct(*views, **given), capi.reconstruct(*views, **given)
     assert same_bytes(ours.gaussians, theirs.gaussians)
     assert ours.report["cloud"] == theirs.report["cloud"] and ours.report["cloud"]["used"] > 0
-    for name in ("prior", "calibrate", "symmetry", "relight", "photo", "check"):
+    for name in ("prior", "calibrate", "symmetry", "relight", "photo", "check", "resolution", "max_views"):
         assert ours.report["settings"][name] == theirs.report["settings"][name] == given[name]
     # The settings are what a budget chose; the budget itself is in the plan.
     assert ours.report["plan"]["budget_s"] == theirs.report["plan"]["budget_s"] == given["budget"]
@@ -388,6 +390,8 @@ def test_errors_have_the_same_codes_and_texts(ellipsoid: Views, tmp_path: Path) 
         ({"photo": 2}, "options.photo: 2; allowed: 0 (no), 1 (yes)"),
         ({"budget": 0}, "budget: 0; allowed: seconds above 0"),
         ({"budget": -1}, "options.budget_s: -1"),
+        ({"resolution": 0}, "options.resolution: 0; allowed: above 0, at most 1"),
+        ({"max_views": 0}, "max_views: 0; allowed: at least 1"),
         ({"cloud": np.zeros((4, 2), np.float32)}, "cloud: shape (4, 2); allowed: (n, 3)"),
         ({"cloud": np.full((4, 3), np.nan, np.float32)}, "options.cloud[0]: [NaN, NaN, NaN]; allowed: finite"),
         ({"masks": []}, "masks: 0 entries; allowed: 4, one per image"),

@@ -123,6 +123,8 @@ def test_options_reach_the_library(ellipsoid: Views) -> None:
         relight="never",
         photo=False,
         budget=1e6,
+        resolution=0.5,
+        max_views=2,
         threads=1,
     )
     settings = made.report["settings"]
@@ -134,6 +136,8 @@ def test_options_reach_the_library(ellipsoid: Views) -> None:
     assert not settings["check"] and not settings["photo"]
     assert (settings["calibrate"], settings["relight"]) == ("off", "never")
     assert made.report["plan"]["budget_s"] == 1e6
+    assert (settings["resolution"], settings["max_views"]) == (0.5, 2)
+    assert len(made.report["views_used"]) == 2
     assert made.report["calibration"] is None and made.report["relight"] is None
 
 

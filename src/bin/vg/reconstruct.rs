@@ -53,7 +53,12 @@ pub(crate) fn summary(made: &Reconstruction) -> String {
     let report = &made.report;
     let extent = report.extent_m.as_ref().map_or_else(String::new, |e| format!("{}, ", shown::extent(e)));
     let check = report.input_error.map_or_else(String::new, |e| {
-        format!("; on these views PSNR {:.2} dB, silhouette IoU {:.3}", e.psnr_db, e.silhouette_iou)
+        format!(
+            "; on these views PSNR {:.2} dB, silhouette IoU {:.3}, at least {:.1} % of each mask covered",
+            e.psnr_db,
+            e.silhouette_iou,
+            100.0 * e.mask_covered
+        )
     });
     format!(
         "{} Gaussians, {extent}SH degree {}, prior {}, {} views, {:.2} s{check}",

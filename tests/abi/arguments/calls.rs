@@ -127,6 +127,12 @@ fn finite() -> Tries {
     [f64::NAN, f64::INFINITY, f64::NEG_INFINITY].map(|v| (v.to_bits(), Refused)).to_vec()
 }
 
+/// A part of a whole, not nothing.
+fn share() -> Tries {
+    let bad = [0.0, -0.0, -0.5, 1f64.next_up(), 1e300].map(|v| (v.to_bits(), Refused));
+    [0.5f64, 1.0].map(|v| (v.to_bits(), Fine)).into_iter().chain(bad).chain(finite()).collect()
+}
+
 /// Seconds, 0 for none.
 fn budget() -> Tries {
     let good = [0.0f64, -0.0, 1e6].map(|v| (v.to_bits(), Fine));
@@ -1135,12 +1141,15 @@ fn options(context: usize) -> Lent {
         budget_s: budget(),
         cloud: elsewhere(),
         cloud_count: counts(&[10_000_001, 1 << 60, u64::MAX]),
+        resolution: share(),
+        max_views: [0, 1, 4097, 1 << 60, u64::MAX].map(|n| (n, Fine)).to_vec(),
     });
     let mut lent = Lent::zeroed::<vg_options>("vg_options", fields);
     lent.put("context", 0, context as u64);
     lent.put("sh_degree", 0, 2);
     lent.put("check", 0, 1);
     lent.put("photo", 0, 1);
+    lent.put("resolution", 0, 1f64.to_bits());
     for (i, metres) in [4.4f64, 1.8, 1.4].into_iter().enumerate() {
         lent.put("vehicle_size", i, metres.to_bits());
     }

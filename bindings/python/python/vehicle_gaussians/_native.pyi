@@ -183,6 +183,8 @@ def reconstruct(
     check: bool,
     points: bool,
     budget: float | None,
+    resolution: float,
+    max_views: int | None,
     threads: int,
     names: Sequence[str] | None,
     progress: Callable[[str, float], object] | None,

@@ -56,6 +56,8 @@ def reconstruct(
     check: bool = True,
     points: bool = False,
     budget: float | None = None,
+    resolution: float = 1.0,
+    max_views: int | None = None,
     threads: int = 0,
     names: Iterable[str] | None = None,
     progress: Callable[[str, float], object] | None = None,
@@ -83,6 +85,9 @@ def reconstruct(
     check: draw the model into its input views for the report.
     points: return the point cloud as well.
     budget: seconds the call may take, where that matters; what is left out is then chosen to fit.
+    resolution: the share of their width and height to which the views are resampled first, above 0, at most 1; a budget
+    may choose less.
+    max_views: use at most this many views, those that spread best around the vehicle; a budget may choose fewer.
     threads: worker threads; 0 means one per core. The result is the same with any number.
     names: of the views, for messages and the report.
     progress: called as progress(stage, fraction) on this thread; a true return value cancels (a VgError with code
@@ -105,6 +110,8 @@ def reconstruct(
         check=check,
         points=points,
         budget=budget,
+        resolution=resolution,
+        max_views=max_views,
         threads=threads,
         names=None if names is None else list(names),
         progress=progress,

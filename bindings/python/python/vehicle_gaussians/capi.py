@@ -184,6 +184,8 @@ class vg_options(ct.Structure):
         ("budget_s", ct.c_double),
         ("cloud", ct.c_void_p),
         ("cloud_count", ct.c_size_t),
+        ("resolution", ct.c_double),
+        ("max_views", ct.c_size_t),
     )
 
 
@@ -771,6 +773,8 @@ def reconstruct(
     check: bool = True,
     points: bool = False,
     budget: float | None = None,
+    resolution: float = 1.0,
+    max_views: int | None = None,
     names: Iterable[str] | None = None,
     progress: Callable[[str, float], object] | None = None,
     log: Callable[[LogLevel, str], object] | None = None,
@@ -813,6 +817,12 @@ def reconstruct(
         if budget == 0:
             raise VgError(Status.ARGUMENT, f"budget: {budget}; allowed: seconds above 0")
         options.budget_s = budget
+    options.resolution = resolution
+    if max_views is not None:
+        # Of C, 0 is all.
+        if max_views < 1:
+            raise VgError(Status.ARGUMENT, f"max_views: {max_views}; allowed: at least 1")
+        options.max_views = max_views
     if cloud is not None:
         _expect(cloud, "cloud", np.float32)
         if cloud.ndim != 2 or cloud.shape[1] != 3:

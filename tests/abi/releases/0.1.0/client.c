@@ -229,6 +229,10 @@ static vg_gaussians *reconstruct(vg_context *context, const vg_view *views, size
     options.progress = NULL;
     CHECK(options.calibrate == VG_CALIBRATE_AUTO && options.relight == VG_RELIGHT_AUTO && options.photo == 1);
     CHECK(options.budget_s == 0 && options.cloud == NULL && options.cloud_count == 0);
+    CHECK(options.resolution == 1 && options.max_views == 0);
+    options.resolution = 1.5;
+    FAILS(vg_reconstruct(views, count, &options, &again, NULL, &error), VG_STATUS_ARGUMENT, "options.resolution: 1.5");
+    options.resolution = 1;
     options.cloud_count = 2;
     FAILS(vg_reconstruct(views, count, &options, &again, NULL, &error), VG_STATUS_ARGUMENT, "options.cloud: NULL");
     options.cloud = cloud;
