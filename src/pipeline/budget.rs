@@ -128,14 +128,14 @@ const STEPS: &[Step] = &[
     |o| o.photo = false,
     |o| coarser(o, 0.5),
     |o| fewer(o, 8),
-    |o| coarser(o, 0.35),
-    |o| coarser(o, 0.25),
-    |o| fewer(o, 4),
     |o| {
         if o.prior == PriorChoice::Auto {
             o.prior = PriorChoice::Hull;
         }
     },
+    |o| coarser(o, 0.35),
+    |o| coarser(o, 0.25),
+    |o| fewer(o, 4),
     |o| o.calibrate = Calibrate::Off,
     |o| o.relight = Relight::Never,
     |o| fewer(o, 3),
