@@ -55,6 +55,16 @@ pub enum Error {
         /// How to get it, or what to ask for instead.
         remedy: String,
     },
+    /// What was asked for needs something that this machine does not have, or has in a version that cannot be used.
+    #[error("{what}: {found}; {remedy}")]
+    Missing {
+        /// What is needed.
+        what: &'static str,
+        /// What was found instead, and where.
+        found: String,
+        /// What to install, and where to say so.
+        remedy: String,
+    },
     /// The progress callback asked to stop.
     #[error("cancelled during {stage}")]
     Cancelled {

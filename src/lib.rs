@@ -21,6 +21,7 @@ pub mod geometry;
 pub mod head;
 pub mod io;
 pub mod metrics;
+pub mod onnx;
 pub mod pipeline;
 pub mod prior;
 pub mod progress;

@@ -21,6 +21,8 @@ pub enum SymmetryMode {
     Always,
     /// No cloning.
     Never,
+    /// No cloning either: the views' mirror images were taken for further views, the paper's rival of cloning.
+    Flip,
 }
 
 /// A side of the plane y = 0.
@@ -71,7 +73,7 @@ pub fn complete(
     let n = gaussians.len();
     let mut done = Completion { mode, reference_side, cloned: 0, replaced: 0, not_needed: 0 };
     let complete = match mode {
-        SymmetryMode::Never => gaussians,
+        SymmetryMode::Never | SymmetryMode::Flip => gaussians,
         SymmetryMode::Always => {
             let mut reference = gaussians;
             let keep: Vec<bool> = reference.means().iter().map(|m| belongs(m[1], reference_side)).collect();

@@ -218,6 +218,8 @@ impl vg_options {
         let unknown_size = self.vehicle_size == [0.0; 3];
         Ok(Options {
             prior,
+            prior_model: None,
+            head_model: None,
             symmetry: read::choice("options.symmetry", self.symmetry, &symmetries)?,
             vehicle_size: (!unknown_size).then_some(self.vehicle_size),
             sh_degree: sh_degree("options.sh_degree", self.sh_degree)?,

@@ -25,6 +25,8 @@ pub enum vg_status {
     NotBuilt = 6,
     /// A bug in the library. The call had no effect; other handles are as they were.
     Internal = 7,
+    /// What was asked for needs something that this machine does not have: ONNX Runtime, a device.
+    Missing = 8,
 }
 
 /// Why a call failed. Owned by the caller, who frees it with `vg_error_free`; it never changes, and any thread may
@@ -71,6 +73,7 @@ impl From<&Error> for vg_status {
             Error::Reconstruction { .. } => Self::Reconstruction,
             Error::Cancelled { .. } => Self::Cancelled,
             Error::NotBuilt { .. } => Self::NotBuilt,
+            Error::Missing { .. } => Self::Missing,
         }
     }
 }

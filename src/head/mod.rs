@@ -2,8 +2,10 @@
 
 pub mod appearance;
 pub mod attributes;
+pub mod network;
 pub mod surfel;
 
+pub use network::NetworkHead;
 pub use surfel::SurfelHead;
 
 use crate::error::Result;

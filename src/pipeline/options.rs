@@ -1,6 +1,7 @@
 //! What a caller may choose; `Options::default()` is what everything is measured with.
 
 use crate::error::{Error, Result};
+use crate::onnx::Model;
 use crate::relight::Relight;
 use crate::symmetry::SymmetryMode;
 use serde::{Deserialize, Serialize};
@@ -18,6 +19,21 @@ pub enum PriorChoice {
     Hull,
     /// The hull, corrected by what vehicles look like.
     Shape,
+    /// The network of [`Options::prior_model`].
+    Onnx,
+}
+
+impl PriorChoice {
+    /// As in the command line and in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Given => "given",
+            Self::Hull => "hull",
+            Self::Shape => "shape",
+            Self::Onnx => "onnx",
+        }
+    }
 }
 
 /// Whether the plane of symmetry and the cameras are corrected before anything else, see [`crate::calibrate`].
@@ -51,6 +67,10 @@ pub struct Keep {
 pub struct Options {
     /// Depth source.
     pub prior: PriorChoice,
+    /// A geometry network for the `Onnx` prior, see [`crate::prior::network`].
+    pub prior_model: Option<Model>,
+    /// A Gaussian head, see [`crate::head::network`]; `None` for the surfel head, which needs no weights.
+    pub head_model: Option<Model>,
     /// Whether cameras are corrected where the silhouettes contradict them.
     pub calibrate: Calibrate,
     /// When Gaussians are cloned across y = 0.
@@ -83,6 +103,8 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             prior: PriorChoice::Auto,
+            prior_model: None,
+            head_model: None,
             calibrate: Calibrate::Auto,
             symmetry: SymmetryMode::Auto,
             relight: Relight::Auto,
@@ -103,6 +125,20 @@ impl Default for Options {
 impl Options {
     /// Each field in its range.
     pub fn validate(&self) -> Result<()> {
+        match (self.prior, &self.prior_model) {
+            (PriorChoice::Onnx, None) => {
+                return Err(Error::argument(
+                    "options.prior_model",
+                    "none",
+                    "an open model for the prior onnx",
+                ));
+            }
+            (PriorChoice::Onnx, Some(_)) | (_, None) => {}
+            (other, Some(model)) => {
+                let found = format!("{}, with the prior {}", model.path().display(), other.name());
+                return Err(Error::argument("options.prior_model", found, "none, or the prior onnx"));
+            }
+        }
         if let Some(size) = self.vehicle_size {
             const SIZE_M: std::ops::RangeInclusive<f64> = 0.1..=30.0;
             if !size.iter().all(|s| SIZE_M.contains(s)) {

@@ -3,7 +3,7 @@
 use super::budget::BudgetPlan;
 use super::options::Options;
 use crate::calibrate::Calibration;
-use crate::prior::{BoxSource, Filled, PhotoFit, PointFit, VehicleBox};
+use crate::prior::{BoxSource, Filled, NetworkFit, PhotoFit, PointFit, VehicleBox};
 use crate::relight::Relighting;
 use crate::symmetry::Completion;
 use serde::Serialize;
@@ -93,6 +93,8 @@ pub struct Report {
     pub photo: Option<PhotoFit>,
     /// How the prior closed what its surface left open of the masks.
     pub masks: Option<Filled>,
+    /// What the network said whose depth was taken, and how far it agrees with the cameras.
+    pub network: Option<NetworkFit>,
     /// How the options were chosen, where the caller gave a budget.
     pub plan: Option<BudgetPlan>,
     /// Work this scene did not need.

@@ -10,14 +10,14 @@ use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
 use crate::geometry::{Camera, Similarity};
 use crate::head::surfel::FOOTPRINT_SIGMA_PX;
-use crate::head::{GaussianHead, SurfelHead};
+use crate::head::{GaussianHead, NetworkHead, SurfelHead};
 use crate::metrics;
-use crate::prior::{DepthPrior, Geometry, GivenDepth, HullPrior, ShapePrior};
+use crate::prior::{DepthPrior, Geometry, GivenDepth, HullPrior, NetworkPrior, ShapePrior};
 use crate::progress::{Context, ProgressCallback, Threads};
 use crate::relight::{Light, Relight, Relighting};
 use crate::render::{CpuRenderer, RenderOptions, Renderer};
 use crate::scene::visibility::{Observer, SURFACE_M, Sight};
-use crate::scene::{Cloud, Scene, View, resize, undistort};
+use crate::scene::{Cloud, Scene, View, mirror, resize, undistort};
 use crate::symmetry::{self, Completion, MirroredPlace, SymmetryMode};
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
@@ -92,7 +92,11 @@ pub fn reconstruct_on<'a>(
     };
     plan::note(&mut left_out, "calibration", why.unwrap_or_default(), usize::from(why.is_some()));
     // From here to the symmetry all is in the frame whose y = 0 is the plane that was found.
-    let views = moved.as_ref().map_or(views, |moved| moved.views.clone());
+    let seen = moved.as_ref().map_or(views, |moved| moved.views.clone());
+    let views = match options.symmetry {
+        SymmetryMode::Flip => seen.iter().cloned().chain(seen.iter().map(mirror::mirrored)).collect(),
+        _ => seen.clone(),
+    };
     clock.lap("calibrate");
 
     context.report("prior", 0.0)?;
@@ -101,7 +105,7 @@ pub fn reconstruct_on<'a>(
         None => cloud.clone(),
     });
     let source = plan::prior(options.prior, views.iter().all(|v| v.depth.is_some()));
-    let prior = chosen_prior(source, cloud, options);
+    let prior = chosen_prior(source, cloud, options)?;
     let mut geometry = prior.estimate(&views, &context)?;
     geometry.find_normals(&views, &context);
     if let Some(cloud) = &scene.cloud {
@@ -111,11 +115,15 @@ pub fn reconstruct_on<'a>(
 
     context.report("pixels", 0.0)?;
     let kept = context.parallel(|| pixels::kept(&views, &geometry, &options.keep, &mut left_out));
-    let points = options.points.then(|| point_cloud(&views, &geometry));
+    let points = options.points.then(|| point_cloud(&seen, &geometry));
     clock.lap("pixels");
 
     context.report("head", 0.0)?;
-    let head = SurfelHead::new(plan::sh_degree(&views, &geometry, options, &mut left_out));
+    let degree = plan::sh_degree(&views, &geometry, options, &mut left_out);
+    let head: Box<dyn GaussianHead> = match &options.head_model {
+        Some(model) => Box::new(NetworkHead::new(model.clone(), degree)?),
+        None => Box::new(SurfelHead::new(degree)),
+    };
     let gaussians = head.predict(&views, &geometry, &kept, &context)?;
     if gaussians.is_empty() {
         return Err(Error::Reconstruction {
@@ -131,7 +139,7 @@ pub fn reconstruct_on<'a>(
     plan::note(&mut left_out, "clones", "the mirrored place was observed by a view", completion.not_needed);
     let (gaussians, points, views) = match &moved {
         Some(moved) => back_in_vehicle(&gaussians, points, moved, &context)?,
-        None => (gaussians, points, views),
+        None => (gaussians, points, seen),
     };
     clock.lap("symmetry");
 
@@ -159,6 +167,7 @@ pub fn reconstruct_on<'a>(
         cloud: geometry.points,
         photo: geometry.photo,
         masks: geometry.masks,
+        network: geometry.network,
         plan: budget,
         left_out,
         symmetry: completion,
@@ -211,16 +220,20 @@ fn undistorted(
     Ok(views)
 }
 
-fn chosen_prior(choice: PriorChoice, cloud: Option<Cloud>, options: &Options) -> Box<dyn DepthPrior> {
+fn chosen_prior(choice: PriorChoice, cloud: Option<Cloud>, options: &Options) -> Result<Box<dyn DepthPrior>> {
     let size = options.vehicle_size;
     let voxel_m = cost::voxel_m(options.resolution);
-    match choice {
+    Ok(match choice {
+        PriorChoice::Onnx => {
+            let model = options.prior_model.clone().expect("options were validated");
+            Box::new(NetworkPrior::new(model)?)
+        }
         PriorChoice::Given => Box::new(GivenDepth),
         PriorChoice::Hull => Box::new(HullPrior { size, cloud, voxel_m }),
         PriorChoice::Shape | PriorChoice::Auto => {
             Box::new(ShapePrior { size, cloud, photo: options.photo, voxel_m })
         }
-    }
+    })
 }
 
 /// Every vehicle pixel with depth, lifted (paper eqs. `metric_point_ray`, `vehicle_point`).
@@ -267,7 +280,7 @@ fn complete(
         mirrored
     };
     let light = match (options.relight, options.symmetry) {
-        (Relight::Never, _) | (_, SymmetryMode::Never) => None,
+        (Relight::Never, _) | (_, SymmetryMode::Never | SymmetryMode::Flip) => None,
         (Relight::Auto, _) => Light::estimate(&gaussians),
     };
     let (mut gaussians, done) = symmetry::complete(gaussians, options.symmetry, &cameras, |gaussians| {

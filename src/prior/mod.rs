@@ -2,6 +2,7 @@
 
 pub mod given;
 pub mod hull;
+pub mod network;
 pub mod normals;
 mod photo;
 pub mod shape;
@@ -10,6 +11,7 @@ pub mod volume;
 
 pub use given::GivenDepth;
 pub use hull::HullPrior;
+pub use network::{NetworkFit, NetworkPrior};
 pub use photo::PhotoFit;
 pub use shape::ShapePrior;
 pub use volume::{Filled, PointFit};
@@ -45,12 +47,22 @@ pub struct Geometry {
     pub photo: Option<PhotoFit>,
     /// How it closed what its surface left open of the masks, where it does.
     pub masks: Option<Filled>,
+    /// What a network said, where one was asked.
+    pub network: Option<NetworkFit>,
 }
 
 impl Geometry {
     /// Depth without normals yet.
     pub fn new(depths: Vec<DepthMap>, vehicle_box: Option<VehicleBox>) -> Self {
-        Self { depths, normals: Vec::new(), vehicle_box, points: None, photo: None, masks: None }
+        Self {
+            depths,
+            normals: Vec::new(),
+            vehicle_box,
+            points: None,
+            photo: None,
+            masks: None,
+            network: None,
+        }
     }
 
     /// About the middle of what the views see, vehicle frame, metres: the mean of some lifted pixels.

@@ -4,6 +4,7 @@ pub mod cloud;
 pub mod depth;
 pub mod image;
 pub mod mask;
+pub(crate) mod mirror;
 pub(crate) mod resize;
 pub mod undistort;
 pub mod view;

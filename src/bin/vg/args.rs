@@ -1,7 +1,9 @@
 //! The command line: commands, options, and what their values may be.
 
+use crate::job::{Failure, Result, USAGE};
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use vg::onnx::{Model, ModelOptions, Provider};
 use vg::pipeline::{Calibrate, Keep, Options, PriorChoice};
 use vg::relight::Relight;
 use vg::render::Background;
@@ -37,11 +39,24 @@ pub(crate) enum Command {
 /// How a reconstruction is made; shared by `reconstruct` and `eval`.
 #[derive(Args)]
 pub(crate) struct MethodArgs {
-    /// Depth source: the scene's own depth; the visual hull; the hull corrected by what vehicles look like; or (auto)
-    /// the first if every used view has depth, else the last
+    /// Depth source: the scene's own depth; the visual hull; the hull corrected by what vehicles look like (shape);
+    /// the network of --prior-model (onnx); or (auto) the first if every used view has depth, else shape
     #[arg(long, value_enum, default_value_t = Prior::Auto)]
     pub(crate) prior: Prior,
-    /// Mirror what was not observed (auto), all of the denser side (always), or nothing (never)
+    /// The geometry network of --prior onnx: an ONNX file in the contract of docs/ONNX.md
+    #[arg(long, value_name = "M.onnx")]
+    pub(crate) prior_model: Option<PathBuf>,
+    /// A Gaussian head, an ONNX file in the contract of docs/ONNX.md, instead of the built-in one
+    #[arg(long, value_name = "M.onnx")]
+    pub(crate) head_model: Option<PathBuf>,
+    /// ONNX Runtime's library or its folder; else VG_ONNXRUNTIME, else that of an installed Python package
+    #[arg(long, value_name = "PATH")]
+    onnxruntime: Option<PathBuf>,
+    /// Where networks run: the processor, CUDA, or CUDA where it can be had
+    #[arg(long, value_enum, default_value_t = RunsOn::Cpu)]
+    provider: RunsOn,
+    /// Mirror what was not observed (auto), all of the denser side (always), nothing (never), or the photographs
+    /// instead of the model (flip)
     #[arg(long, value_enum, default_value_t = Symmetry::Auto)]
     symmetry: Symmetry,
     /// Show mirror images in the light of their own side, as far as it can be told from what was seen (auto), or as
@@ -82,8 +97,33 @@ pub(crate) struct MethodArgs {
 }
 
 impl MethodArgs {
-    /// For the library.
-    pub(crate) fn options(&self) -> Options {
+    /// For the library; models are opened.
+    pub(crate) fn options(&self) -> Result<Options> {
+        if (self.prior == Prior::Onnx) != self.prior_model.is_some() {
+            let message = "--prior onnx and --prior-model M.onnx go together".into();
+            return Err(Failure { message, code: USAGE });
+        }
+        let model = |path: &Path| Model::open(path, &self.model_options());
+        let (prior_model, head_model) = (self.prior_model.as_deref(), self.head_model.as_deref());
+        Ok(Options {
+            prior_model: prior_model.map(model).transpose()?,
+            head_model: head_model.map(model).transpose()?,
+            ..self.plain_options()
+        })
+    }
+
+    fn model_options(&self) -> ModelOptions {
+        ModelOptions {
+            runtime: self.onnxruntime.clone(),
+            provider: if self.provider == RunsOn::Cpu { Provider::Cpu } else { Provider::Cuda },
+            fall_back: self.provider == RunsOn::Auto,
+            threads: self.threads,
+            ..ModelOptions::default()
+        }
+    }
+
+    /// Without models.
+    fn plain_options(&self) -> Options {
         let kept = |item: KeepItem| self.keep.contains(&item) || self.keep.contains(&KeepItem::All);
         Options {
             prior: match self.prior {
@@ -91,11 +131,15 @@ impl MethodArgs {
                 Prior::Given => PriorChoice::Given,
                 Prior::Hull => PriorChoice::Hull,
                 Prior::Shape => PriorChoice::Shape,
+                Prior::Onnx => PriorChoice::Onnx,
             },
+            prior_model: None,
+            head_model: None,
             symmetry: match self.symmetry {
                 Symmetry::Auto => SymmetryMode::Auto,
                 Symmetry::Always => SymmetryMode::Always,
                 Symmetry::Never => SymmetryMode::Never,
+                Symmetry::Flip => SymmetryMode::Flip,
             },
             relight: match self.relight {
                 Relit::Auto => Relight::Auto,
@@ -271,6 +315,14 @@ pub(crate) enum Prior {
     Given,
     Hull,
     Shape,
+    Onnx,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum RunsOn {
+    Cpu,
+    Cuda,
+    Auto,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -278,6 +330,7 @@ enum Symmetry {
     Auto,
     Always,
     Never,
+    Flip,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]

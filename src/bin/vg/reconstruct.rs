@@ -16,17 +16,28 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
         .cloned()
         .collect();
     // Depth that will not be used is not read either.
-    let load_depth = args.method.prior != Prior::Hull;
+    let load_depth = matches!(args.method.prior, Prior::Auto | Prior::Given);
     let options = scene::options(&args.frame, args.depth.depth_scale, load_depth)?;
     let index = io::list_scene(&args.scene, &scene::named(args.views.views.as_deref(), &options))?;
-    let read: Vec<_> = scene::files_of(&index).into_iter().chain(args.method.cloud.clone()).collect();
+    let read: Vec<_> = scene::files_of(&index)
+        .into_iter()
+        .chain(
+            [&args.method.cloud, &args.method.prior_model, &args.method.head_model]
+                .into_iter()
+                .flatten()
+                .cloned(),
+        )
+        .collect();
     files::refuse_clashes(&outputs, &read)?;
     outputs.iter().try_for_each(|path| files::prepare(path))?;
 
     let mut opened = scene::load(index)?;
     opened.scene.cloud = args.method.cloud.as_deref().map(cloud::read).transpose()?;
-    let settings = Options { points: args.points.is_some(), check: !args.no_check, ..args.method.options() };
+    let settings = Options { points: args.points.is_some(), check: !args.no_check, ..args.method.options()? };
     let made = reconstruct(&opened.scene, &settings)?;
+    for warning in made.report.network.iter().flat_map(|network| &network.warnings) {
+        note(warning);
+    }
     if let Some(plan) = made.report.plan.as_ref().filter(|plan| !plan.fits) {
         let BudgetPlan { budget_s, predicted_s, .. } = plan;
         note(&format!("the budget of {budget_s} s cannot be kept: the least takes about {predicted_s:.2} s"));

@@ -44,7 +44,7 @@ struct Document<'a> {
 /// Every scene that can be evaluated is; the others are errors, and the exit code says that there were some.
 pub(crate) fn run(args: &EvalArgs) -> Result {
     args.json.iter().try_for_each(|path| files::prepare(path))?;
-    let settings = args.method.options();
+    let settings = args.method.options()?;
     let (mut rows, mut errors) = (Vec::new(), Vec::new());
     for path in &args.scenes {
         let shown = path.display().to_string();

@@ -1,0 +1,155 @@
+//! One way to open and run an ONNX model. What its numbers mean is the business of those who run it.
+//!
+//! ONNX Runtime is a shared library that is loaded when the first model is opened, see [`ModelOptions::runtime`].
+//! Without the feature `onnx` every model is refused with [`Error::NotBuilt`].
+
+#[cfg(not(feature = "onnx"))]
+#[path = "absent.rs"]
+mod backend;
+#[cfg(feature = "onnx")]
+#[path = "session.rs"]
+mod backend;
+mod ports;
+#[cfg(feature = "onnx")]
+mod runtime;
+
+pub(crate) use ports::Broken;
+pub use ports::{Port, Ports};
+
+use crate::error::{Error, Result};
+use serde::{Serialize, Serializer};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Where a model runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Provider {
+    /// The processor.
+    #[default]
+    Cpu,
+    /// The first CUDA device, where the runtime was built for it.
+    Cuda,
+}
+
+/// How a model is opened.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ModelOptions {
+    /// ONNX Runtime, the library or its folder. `None`: what the environment variable `VG_ONNXRUNTIME` names, else
+    /// the one inside an installed Python package `onnxruntime`. A process has one: the first that was loaded.
+    pub runtime: Option<PathBuf>,
+    /// Where the model runs.
+    pub provider: Provider,
+    /// Whether the processor may step in where the provider cannot be had; else that is an error.
+    pub fall_back: bool,
+    /// Threads of the runtime's own, held as long as the model is open; 0 means one per core.
+    pub threads: usize,
+    /// Whether weights are rearranged for speed when the model is opened, which can take as much memory again.
+    /// `None`: where the files take less than 1 GiB.
+    pub prepack: Option<bool>,
+    /// Whether the runtime keeps the memory of a run for the next one.
+    pub arena: bool,
+}
+
+impl Default for ModelOptions {
+    fn default() -> Self {
+        Self {
+            runtime: None,
+            provider: Provider::Cpu,
+            fall_back: false,
+            threads: 0,
+            prepack: None,
+            arena: false,
+        }
+    }
+}
+
+/// An open model. Clones share it; threads take turns.
+#[derive(Clone)]
+pub struct Model {
+    inner: Arc<Inner>,
+}
+
+struct Inner {
+    path: PathBuf,
+    ports: Ports,
+    session: Mutex<backend::Session>,
+}
+
+/// A tensor lent to a run.
+#[derive(Clone, Copy, Debug)]
+pub struct Input<'a> {
+    /// Of the input it is for.
+    pub name: &'a str,
+    /// The product is the number of values.
+    pub shape: &'a [usize],
+    /// Row-major.
+    pub data: &'a [f32],
+}
+
+/// A tensor that came of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tensor {
+    /// The product is the number of values.
+    pub shape: Vec<usize>,
+    /// Row-major.
+    pub data: Vec<f32>,
+}
+
+impl Model {
+    /// Opens the model in a file; weights in files beside it are found by their names.
+    ///
+    /// # Errors
+    /// [`Error::NotBuilt`] without the feature `onnx`, [`Error::Io`] without the file, [`Error::Missing`] without a
+    /// runtime or the provider, [`Error::Format`] where the runtime refuses the file.
+    pub fn open(path: &Path, options: &ModelOptions) -> Result<Self> {
+        backend::is_built()?;
+        let file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
+        if !file.metadata().is_ok_and(|m| m.is_file()) {
+            return Err(Error::argument("model", format!("{}, no file", path.display()), "an ONNX file"));
+        }
+        let (session, ports) = backend::Session::open(path, options)?;
+        Ok(Self { inner: Arc::new(Inner { path: path.to_owned(), ports, session: Mutex::new(session) }) })
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.inner.path
+    }
+
+    /// What it takes, gives, and says of itself.
+    pub fn ports(&self) -> &Ports {
+        &self.inner.ports
+    }
+
+    /// Runs the model. The outputs are in the order of [`Ports::outputs`]; those that are not float32 tensors are
+    /// `None`.
+    pub fn run(&self, inputs: &[Input]) -> Result<Vec<Option<Tensor>>> {
+        let mut session = self.inner.session.lock().unwrap_or_else(PoisonError::into_inner);
+        session.run(inputs).map_err(|reason| self.broken("run", reason))
+    }
+
+    /// An error about this model.
+    pub fn broken(&self, field: impl Into<String>, reason: impl Into<String>) -> Error {
+        Error::format(&self.inner.path, field, reason)
+    }
+}
+
+impl std::fmt::Debug for Model {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Model").field("path", &self.inner.path).finish_non_exhaustive()
+    }
+}
+
+/// The same open model.
+impl PartialEq for Model {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.inner, &other.inner)
+    }
+}
+
+/// Its file's path.
+impl Serialize for Model {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&self.inner.path.to_string_lossy())
+    }
+}
