@@ -229,6 +229,29 @@ fn where_both_sides_are_seen_nothing_is_cloned_but_what_is_missing() {
     assert!(left_out(&both, "mirrored place") > 1000);
 }
 
+#[test]
+fn flipped_photographs_are_taken_for_further_views() {
+    let scene = right_side(160, 120);
+    let flip = Options { symmetry: SymmetryMode::Flip, points: true, ..Options::default() };
+    let made = run(&scene, &flip);
+    let symmetry = &made.report.symmetry;
+    assert_eq!((symmetry.mode, symmetry.cloned, symmetry.replaced), (SymmetryMode::Flip, 0, 0));
+    assert_eq!(made.report.views_used, ["-40", "-75", "-105", "-140"]);
+    // The cloud is what was measured; the model is whole.
+    assert!(made.points.unwrap().positions.iter().all(|p| p[1] < 0.3));
+    let unseen = view("unseen", camera(90.0, 6.5, 160, 120));
+    let drawn =
+        CpuRenderer::new().render(&made.gaussians, &unseen.camera, &RenderOptions::default()).unwrap();
+    let db = metrics::psnr(&drawn.color, &metrics::on_white(&unseen));
+    let cloned = run(&scene, &Options { symmetry: SymmetryMode::Always, ..Options::default() });
+    let drawn =
+        CpuRenderer::new().render(&cloned.gaussians, &unseen.camera, &RenderOptions::default()).unwrap();
+    let cloned_db = metrics::psnr(&drawn.color, &metrics::on_white(&unseen));
+    assert!((db - cloned_db).abs() < 1.0, "{db:.2} dB flipped, {cloned_db:.2} cloned");
+    // Silhouettes alone, too.
+    assert!(run(&without_depth(scene), &flip).report.gaussians > 1000);
+}
+
 /// Mean absolute difference of colour within `band` metres of the plane and beyond it, and the least alpha within,
 /// two pixels and more inside the silhouette; at front and rear, for no view
 /// shows the middle of the roof, and above the sill.

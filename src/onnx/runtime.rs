@@ -1,7 +1,6 @@
 //! Finds and loads ONNX Runtime, once in a process.
 
 use crate::error::{Error, Result};
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -27,18 +26,16 @@ pub(super) fn load(asked: Option<&Path>) -> Result<()> {
     let path = match (asked, named()) {
         (Some(path), _) => path,
         (None, Some(named)) => library_in(Path::new(&named))?,
-        (None, None) => {
-            of_python().ok_or_else(|| missing("none found in an installed Python package".into()))?
-        }
+        (None, None) => of_python().ok_or_else(|| missing("none found in an installed Python package"))?,
     };
     let path = canonical(&path);
-    let environment = ort::init_from(&path).map_err(|e| missing(e.to_string()))?;
+    let environment = ort::init_from(&path).map_err(|e| missing(&e.to_string()))?;
     environment.with_name("vg").with_telemetry(false).commit();
     *loaded = Some(path);
     Ok(())
 }
 
-fn missing(found: String) -> Error {
+fn missing(found: &str) -> Error {
     let found = found.split_whitespace().collect::<Vec<_>>().join(" ");
     let oldest = ort::MINOR_VERSION;
     let remedy = format!(
@@ -57,11 +54,11 @@ fn library_in(path: &Path) -> Result<PathBuf> {
     if !path.is_dir() {
         return match path.exists() {
             true => Ok(path.to_owned()),
-            false => Err(missing(format!("{} does not exist", path.display()))),
+            false => Err(missing(&format!("{} does not exist", path.display()))),
         };
     }
     let found = newest(path, is_library);
-    found.ok_or_else(|| missing(format!("no libonnxruntime in {}", path.display())))
+    found.ok_or_else(|| missing(&format!("no libonnxruntime in {}", path.display())))
 }
 
 fn is_library(name: &str) -> bool {
@@ -76,7 +73,7 @@ fn of_python() -> Option<PathBuf> {
     let mut prefixes: Vec<PathBuf> =
         ["VIRTUAL_ENV", "CONDA_PREFIX"].iter().filter_map(|n| folder(n)).collect();
     prefixes.extend(folder("HOME").map(|home| home.join(".local")));
-    for bin in std::env::split_paths(&std::env::var_os("PATH").unwrap_or_else(OsString::new)) {
+    for bin in std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()) {
         let python = bin.join("python3");
         if python.exists() {
             let parents = [Some(python.clone()), python.canonicalize().ok()];

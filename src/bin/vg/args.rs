@@ -1,6 +1,6 @@
 //! The command line: commands, options, and what their values may be.
 
-use crate::job::{Failure, Result, USAGE};
+use crate::job::{self, Failure, USAGE};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
 use vg::onnx::{Model, ModelOptions, Provider};
@@ -98,7 +98,7 @@ pub(crate) struct MethodArgs {
 
 impl MethodArgs {
     /// For the library; models are opened.
-    pub(crate) fn options(&self) -> Result<Options> {
+    pub(crate) fn options(&self) -> job::Result<Options> {
         if (self.prior == Prior::Onnx) != self.prior_model.is_some() {
             let message = "--prior onnx and --prior-model M.onnx go together".into();
             return Err(Failure { message, code: USAGE });

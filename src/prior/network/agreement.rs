@@ -126,14 +126,19 @@ fn pairs(views: &[View], depths: &[DepthMap]) -> Vec<Pair> {
     let mut out = Vec::new();
     for (i, (view, depth)) in views.iter().zip(depths).enumerate() {
         let seen: Vec<(u32, u32, f32)> = vehicle_pixels(view, depth).collect();
-        for (u, v, z) in seen.iter().step_by((seen.len() / SAMPLES).max(1)) {
-            let place = view.lift(*u, *v, *z).as_dvec3();
-            for (j, other) in views.iter().enumerate().filter(|(j, _)| *j != i) {
-                if let Some((found, expected)) = seen_by(other, &depths[j], place)
-                    && (found / expected).max(expected / found) < SAME
+        let every = (seen.len() / SAMPLES).max(1);
+        for (j, other) in views.iter().enumerate().filter(|(j, _)| *j != i) {
+            // From camera to camera: the frame between them may be kilometres away.
+            let to_from = other.camera.vehicle_from_camera.inverse().after(&view.camera.vehicle_from_camera);
+            for (u, v, z) in seen.iter().step_by(every) {
+                let [x, y] =
+                    view.camera.intrinsics.normalized_from_pixel([f64::from(*u) + 0.5, f64::from(*v) + 0.5]);
+                let place = to_from.transform_point(f64::from(*z) * DVec3::new(x, y, 1.0));
+                if let Some(found) = depth_towards(other, &depths[j], place)
+                    && (found / place.z).max(place.z / found) < SAME
                 {
                     // Farther in j than projected from i: i is too near, or j too far.
-                    out.push(Pair { from: i, to: j, ratio: (found / expected).ln() });
+                    out.push(Pair { from: i, to: j, ratio: (found / place.z).ln() });
                 }
             }
         }
@@ -148,15 +153,14 @@ fn vehicle_pixels<'a>(view: &'a View, depth: &'a DepthMap) -> impl Iterator<Item
         .filter_map(|(u, v)| Some((u, v, depth.get(u, v)?)))
 }
 
-/// The depth that a view has where it looks at `place`, and the depth of `place`.
-fn seen_by(view: &View, depth: &DepthMap, place: DVec3) -> Option<(f64, f64)> {
+/// The depth of the vehicle that a view has in the direction of `place`, a point in its camera's frame.
+fn depth_towards(view: &View, depth: &DepthMap, place: DVec3) -> Option<f64> {
     let camera: &Camera = &view.camera;
-    let local = camera.vehicle_from_camera.inverse().transform_point(place);
-    let [u, v] = camera.project(local)?;
+    let [u, v] = camera.project(place)?;
     let inside = u >= 0.0 && v >= 0.0 && u < f64::from(camera.width) && v < f64::from(camera.height);
     let (u, v) = (u as u32, v as u32);
     if !inside || view.mask.as_ref().is_some_and(|m| !m.is_vehicle(u, v)) {
         return None;
     }
-    Some((f64::from(depth.get(u, v)?), local.z))
+    depth.get(u, v).map(f64::from)
 }

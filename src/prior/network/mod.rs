@@ -191,19 +191,16 @@ impl NetworkPrior {
         let mut take = |at: usize, shape: &[usize]| self.checked(&names[at].name, outputs[at].take(), shape);
         let at = self.contract.outputs;
         let map = [n, height, width];
-        let optional = |at: Option<usize>,
-                        shape: &[usize],
-                        take: &mut dyn FnMut(usize, &[usize]) -> Result<Vec<f32>>| {
-            at.map(|at| take(at, shape)).transpose()
-        };
+        let poses = at.poses.map(|at| take(at, &[n, 4, 4])).transpose()?;
+        let scale = at.scale.map(|at| take(at, &[1])).transpose()?;
         let said = Said {
             pixels: width * height,
             depth: take(at.depth, &map)?,
-            rays: optional(at.rays, &[n, height, width, 3], &mut take)?,
-            scale: optional(at.scale, &[1], &mut take)?.map_or(1.0, |s| f64::from(s[0])),
-            confidence: optional(at.confidence, &map, &mut take)?,
-            mask: optional(at.mask, &map, &mut take)?,
-            poses: optional(at.poses, &[n, 4, 4], &mut take)?.map(|m| self.poses(&m)).transpose()?,
+            rays: at.rays.map(|at| take(at, &[n, height, width, 3])).transpose()?,
+            scale: scale.map_or(1.0, |s| f64::from(s[0])),
+            confidence: at.confidence.map(|at| take(at, &map)).transpose()?,
+            mask: at.mask.map(|at| take(at, &map)).transpose()?,
+            poses: poses.map(|numbers| self.poses(&numbers)).transpose()?,
         };
         self.check(&said)?;
         Ok(said)
