@@ -27,8 +27,12 @@ LAUNCHER = """
 import runpy, sys, types
 package, rest = sys.argv[1], sys.argv[2:]
 cut = rest.index("--")
-for name in rest[:cut]:
-    sys.modules[name] = None
+without = set(rest[:cut])
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        if name in without or name.partition(".")[0] in without:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+sys.meta_path.insert(0, Missing())
 parent = sys.modules["vehicle_gaussians"] = types.ModuleType("vehicle_gaussians")
 parent.__path__ = [package]
 program, sys.argv = rest[cut + 1], rest[cut + 1 :]

@@ -13,7 +13,7 @@ import pytest
 import torch
 
 from conftest import Program
-from vehicle_gaussians.export import contract, graph, tiny, tiny_network
+from vehicle_gaussians.export import contract, graph, script, tiny, tiny_network
 
 WIDTH, HEIGHT = 112, 84
 OUTPUTS = ["depth", "rays", "scale", "confidence", "mask", "cam_to_ref_pred"]
@@ -127,7 +127,7 @@ def test_a_network_that_depends_on_the_number_of_views_is_refused(module: Any, t
 
     inputs = graph.example_inputs(2, 28, 28)
     axes = {name: {0: torch.export.Dim("N", min=1)} for name in inputs}
-    with pytest.raises(graph.Unavailable, match="images: the export fixed axis 0 to 2, which has to stay free"):
+    with pytest.raises(script.Unavailable, match="images: the export fixed axis 0 to 2, which has to stay free"):
         graph.write(Fixed(), tmp_path / "fixed.onnx", inputs, axes, ["depth"], {}, {}, 20, False)
     assert list(tmp_path.iterdir()) == []
 

@@ -198,10 +198,10 @@ def shown(shape: Any) -> str:
 
 def check_size(metadata: Mapping[str, str], sizes: Mapping[str, int | str]) -> None:
     """A fixed size fits its own rule; a dynamic one has a rule."""
-    dynamic = [letter for letter in "HW" if sizes[letter] == "dynamic"]
+    dynamic = "dynamic" in (sizes["H"], sizes["W"])
     for key in ("vg.size_multiple", "vg.long_side"):
         if dynamic and key not in metadata:
-            raise ContractError(f"metadata {key}: missing; required where {' and '.join(dynamic)} is dynamic")
+            raise ContractError(f"metadata {key}: missing; required where H or W is dynamic")
     multiple = int(metadata.get("vg.size_multiple", "1"))
     for letter in "HW":
         size = sizes[letter]
