@@ -50,7 +50,6 @@ class DepthAnything3Prior(nn.Module):
             if getattr(block.attn, "rope", None) is not None:
                 channels = transformer.embed_dim // transformer.num_heads
                 block.attn.rope = PositionRotation(channels, positions, transformer.rope.base_frequency)
-        transformer.rope = None if transformer.rope is None else PositionRotation(4, positions, 1.0)
         self.network = network
         self.register_buffer("mean", torch.tensor(IMAGENET_MEAN).view(3, 1, 1))
         self.register_buffer("std", torch.tensor(IMAGENET_STD).view(3, 1, 1))

@@ -4,9 +4,9 @@
     pip install "mapanything @ git+https://github.com/facebookresearch/map-anything"
     python -m vehicle_gaussians.export.mapanything -o mapanything.onnx
 
-Downloads the weights (4.9 GB) on first use. Exporting needs 10 GB of memory and a few minutes. The file has a fixed
-size of the pictures and takes any number of views; export one file for each aspect ratio in use. 518x392 is the
-network's own size for 4:3, 518x518 for squares.
+Downloads the weights (4.9 GB) on first use. Exporting and comparing take about 16 GB of memory and ten minutes. The
+file has a fixed size of the pictures and takes any number of views; export one file for each aspect ratio in use.
+518x392 is the network's own size for 4:3, 518x518 for squares.
 """
 
 from __future__ import annotations
