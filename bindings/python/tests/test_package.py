@@ -68,10 +68,8 @@ def test_everything_public_has_a_docstring() -> None:
 
 def test_types_are_complete_and_true() -> None:
     pytest.importorskip("mypy")
-    checks = [
-        ["mypy"],
-        ["mypy.stubtest", "vehicle_gaussians", "--allowlist", "tests/stubtest-allowlist.txt"],
-    ]
+    settings = ["--mypy-config-file", "pyproject.toml", "--allowlist", "tests/stubtest-allowlist.txt"]
+    checks = [["mypy"], ["mypy.stubtest", "vehicle_gaussians", *settings]]
     for check in checks:
         ran = subprocess.run(
             [sys.executable, "-m", *check], cwd=BINDINGS, capture_output=True, text=True, timeout=300, check=False
