@@ -48,6 +48,8 @@ pub enum vg_symmetry {
     Always = 1,
     /// Nothing is mirrored.
     Never = 2,
+    /// The photographs are mirrored instead of the model, and taken for further views: slower, and rarely better.
+    Flip = 3,
 }
 
 /// Whether mirror images are shown in the light of their own side.
@@ -205,6 +207,7 @@ impl vg_options {
             (vg_symmetry::Auto as i32, "auto", SymmetryMode::Auto),
             (vg_symmetry::Always as i32, "always", SymmetryMode::Always),
             (vg_symmetry::Never as i32, "never", SymmetryMode::Never),
+            (vg_symmetry::Flip as i32, "flip", SymmetryMode::Flip),
         ];
         let calibrations = [
             (vg_calibrate::Auto as i32, "auto", Calibrate::Auto),

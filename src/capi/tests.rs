@@ -105,7 +105,7 @@ fn numbers_of_rust() -> BTreeSet<String> {
         vg_prior { Auto Given Hull Onnx Shape }
         vg_relight { Auto Never }
         vg_status { Ok Argument Format Io Reconstruction Cancelled NotBuilt Internal Missing }
-        vg_symmetry { Auto Always Never }
+        vg_symmetry { Auto Always Never Flip }
     }
     lines
 }

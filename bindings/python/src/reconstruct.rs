@@ -284,7 +284,8 @@ fn parse_symmetry(py: Python<'_>, name: &str) -> PyResult<SymmetryMode> {
         "auto" => Ok(SymmetryMode::Auto),
         "always" => Ok(SymmetryMode::Always),
         "never" => Ok(SymmetryMode::Never),
-        other => Err(bad_value(py, "symmetry", &format!("{other:?}"), "auto, always, never")),
+        "flip" => Ok(SymmetryMode::Flip),
+        other => Err(bad_value(py, "symmetry", &format!("{other:?}"), "auto, always, never, flip")),
     }
 }
 

@@ -1124,7 +1124,7 @@ fn options(context: usize) -> Lent {
         struct_size: elsewhere(),
         context: elsewhere(),
         prior: choice_without(&[0, 1, 2, 4], 3),
-        symmetry: choice(&[0, 1, 2]),
+        symmetry: choice(&[0, 1, 2, 3]),
         sh_degree: choice(&[0, 1, 2, 3]),
         keep: vec![(31, Fine), (32, Refused), (u64::from(u32::MAX), Refused)],
         check: choice(&[0, 1]),

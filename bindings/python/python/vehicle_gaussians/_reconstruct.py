@@ -46,7 +46,7 @@ def reconstruct(
     *,
     prior: Literal["auto", "given", "hull", "shape"] = "auto",
     calibrate: Literal["auto", "off"] = "auto",
-    symmetry: Literal["auto", "always", "never"] = "auto",
+    symmetry: Literal["auto", "always", "never", "flip"] = "auto",
     relight: Literal["auto", "never"] = "auto",
     photo: bool = True,
     cloud: npt.NDArray[np.float32] | None = None,
@@ -73,7 +73,8 @@ def reconstruct(
     the depths if every used view has them, else "shape".
     calibrate: correct cameras and the plane of symmetry where the silhouettes contradict them ("auto"), or take them
     as they are ("off").
-    symmetry: mirror what no view observed ("auto"), all of the denser side ("always"), or nothing ("never").
+    symmetry: mirror what no view observed ("auto"), all of the denser side ("always"), nothing ("never"), or the
+    photographs instead of the model ("flip").
     relight: show mirror images in the light of their own side ("auto"), or as they were seen ("never").
     photo: whether prior "shape" moves its surface to where the photographs agree.
     cloud: points measured on the vehicle, float32 (n, 3), metres, vehicle frame, all finite; some may be wrong or show

@@ -66,7 +66,7 @@ class Calibrate(enum.IntEnum):
 class Symmetry(enum.IntEnum):
     """vg_symmetry"""
 
-    AUTO, ALWAYS, NEVER = range(3)
+    AUTO, ALWAYS, NEVER, FLIP = range(4)
 
 
 class Relight(enum.IntEnum):
@@ -763,7 +763,7 @@ def reconstruct(
     *,
     prior: Literal["auto", "given", "hull", "shape"] = "auto",
     calibrate: Literal["auto", "off"] = "auto",
-    symmetry: Literal["auto", "always", "never"] = "auto",
+    symmetry: Literal["auto", "always", "never", "flip"] = "auto",
     relight: Literal["auto", "never"] = "auto",
     photo: bool = True,
     cloud: npt.NDArray[np.float32] | None = None,
