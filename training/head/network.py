@@ -63,10 +63,6 @@ class Head(nn.Module):
         padded = [nn.functional.pad(t, pad) for t in (images, depth)]
         return self(*padded, intrinsics)[:, :, :height, :width]
 
-    def randomize_last_layer(self, spread):
-        """Weights of standard deviation `spread` instead of zeros, so that a test sees every layer."""
-        nn.init.normal_(self.last.weight, std=spread)
-
 
 class Decoder(nn.Module):
     """From the deepest features up: twice as large, the encoder's features beside, two convolutions."""

@@ -19,7 +19,7 @@ def test_any_size_is_padded_and_cropped(encoder):
 
 def test_padding_is_what_the_contract_says():
     head = Head("tiny").eval()
-    head.randomize_last_layer(0.1)
+    torch.nn.init.normal_(head.last.weight, std=0.1)
     images, depth, intrinsics = example((1, 30, 40), 1)
     padded_images, padded_depth = torch.zeros(1, 3, 32, 64), torch.zeros(1, 32, 64)
     padded_images[:, :, :30, :40], padded_depth[:, :30, :40] = images, depth
@@ -30,7 +30,7 @@ def test_padding_is_what_the_contract_says():
 
 def test_every_view_is_answered_by_itself():
     head = Head("tiny").eval()
-    head.randomize_last_layer(0.1)
+    torch.nn.init.normal_(head.last.weight, std=0.1)
     inputs = example((3, 32, 64), 1)
     with torch.no_grad():
         together = head(*inputs)
@@ -81,7 +81,7 @@ def test_views_without_depth_are_answered():
 
 def test_a_checkpoint_gives_the_same_head_back(tmp_path):
     head = Head("tiny", "sigmoid", offset=False)
-    head.randomize_last_layer(0.1)
+    torch.nn.init.normal_(head.last.weight, std=0.1)
     inputs = example((2, 32, 64), 1)
     head(*inputs)  # moves the running statistics
     head.eval()
