@@ -37,7 +37,7 @@ def main():
     parser.add_argument("--imagenet", help="torchvision's weights of the encoder")
     parser.add_argument("--lpips", help="see lpips.py")
     parser.add_argument("--resume", help="checkpoint to go on from; replaces the three options of the head")
-    parser.add_argument("--iterations", type=int, default=300)
+    parser.add_argument("--iterations", type=int, default=300, help="0 only checks")
     parser.add_argument("--batch", type=int, default=4, help="vehicles per iteration")
     parser.add_argument("--views", type=int, default=4)
     parser.add_argument("--targets", type=int, default=2)
@@ -74,9 +74,10 @@ def main():
             print(f"iteration {iteration}: loss {np.mean(losses):.5f}, {time.time() - start:.0f} s", flush=True)
             losses = []
             save(head, args.output, iteration=iteration)
-    settle(head, scenes, random, args.batch, args.views)
-    save(head, args.output, iteration=args.iterations)
-    report(head, checks, "after")
+    if args.iterations:
+        settle(head, scenes, random, args.batch, args.views)
+        save(head, args.output, iteration=args.iterations)
+        report(head, checks, "after")
 
 
 def draw(scenes, random, batch, views, targets):
