@@ -148,6 +148,10 @@ enum vg_status
      * A bug in the library. The call had no effect; other handles are as they were.
      */
     VG_STATUS_INTERNAL = 7,
+    /**
+     * What was asked for needs something that this machine does not have: ONNX Runtime, a device.
+     */
+    VG_STATUS_MISSING = 8,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -330,6 +334,10 @@ enum vg_symmetry
      * Nothing is mirrored.
      */
     VG_SYMMETRY_NEVER = 2,
+    /**
+     * The photographs are mirrored instead of the model, and taken for further views: slower, and rarely better.
+     */
+    VG_SYMMETRY_FLIP = 3,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

@@ -10,6 +10,7 @@ use crate::onnx::{Broken, Input, Model, Ports};
 use crate::prior::Geometry;
 use crate::progress::Context;
 use crate::scene::View;
+use crate::scene::mask::Label;
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -134,7 +135,9 @@ impl NetworkHead {
         let own = view.camera.width as usize;
         for (pixel, (color, z)) in view.image.pixels().iter().zip(geometry.depths[i].depth()).enumerate() {
             let at = pixel / own * width + pixel % own;
-            depth[at] = *z;
+            // The network measures depth from the mean of what it is given.
+            let vehicle = view.mask.as_ref().is_none_or(|m| m.labels()[pixel] == Label::Vehicle);
+            depth[at] = if vehicle { *z } else { 0.0 };
             for (c, value) in color.iter().enumerate() {
                 images[c * width * height + at] = f32::from(*value) / 255.0;
             }

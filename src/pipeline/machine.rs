@@ -12,15 +12,18 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::hint::black_box;
 use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Pieces of work a second on one thread of the machine that the cost model was measured on.
 const REFERENCE_RATE: f64 = 64_000.0;
 
-/// Pieces per thread and measurement, and measurements of each kind. The fastest counts: whatever else runs can only
-/// slow the others down, and how much will differ by the time it matters.
+/// Pieces per thread and measurement. The fastest measurement counts: whatever else runs can only slow the others
+/// down, and how much will differ by the time it matters.
 const PIECES: usize = 8;
-const REPEATS: usize = 7;
+
+/// How long one thread is measured, and how long all of them: fresh ones may share a core until the system notices.
+const ALONE: Duration = Duration::from_millis(3);
+const TOGETHER: Duration = Duration::from_millis(25);
 
 /// Speed beside one thread of the reference machine.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -42,18 +45,18 @@ impl Machine {
     fn measure(context: &Context) -> Self {
         let Some(probe) = Probe::new() else { return Self { serial: 1.0, parallel: 1.0 } };
         let threads = context.threads();
-        let fastest = |pieces: usize, work: &(dyn Fn() + Sync)| {
-            let seconds = (0..REPEATS).map(|_| {
+        let fastest = |pieces: usize, long: Duration, work: &(dyn Fn() + Sync)| {
+            let (begin, mut least) = (Instant::now(), f64::INFINITY);
+            while begin.elapsed() < long {
                 let start = Instant::now();
                 context.parallel(work);
-                start.elapsed().as_secs_f64()
-            });
-            let least = seconds.fold(f64::INFINITY, f64::min).max(1e-9);
+                least = least.min(start.elapsed().as_secs_f64()).max(1e-9);
+            }
             pieces as f64 / least / REFERENCE_RATE
         };
-        let serial = fastest(PIECES, &|| (0..PIECES).for_each(|k| probe.piece(k)));
+        let serial = fastest(PIECES, ALONE, &|| (0..PIECES).for_each(|k| probe.piece(k)));
         let all = PIECES * threads;
-        let parallel = fastest(all, &|| (0..all).into_par_iter().for_each(|k| probe.piece(k)));
+        let parallel = fastest(all, TOGETHER, &|| (0..all).into_par_iter().for_each(|k| probe.piece(k)));
         // Threads that share a core are no slower together than one alone.
         Self { serial, parallel: parallel.max(serial) }
     }

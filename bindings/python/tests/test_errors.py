@@ -27,6 +27,7 @@ def test_numbers_are_those_of_the_c_library() -> None:
         ("CANCELLED", 5),
         ("NOT_BUILT", 6),
         ("INTERNAL", 7),
+        ("MISSING", 8),
     ]
 
 
@@ -124,7 +125,7 @@ OPTIONS: list[tuple[dict[str, Any], str]] = [
     ({"cloud": np.zeros((4, 2), np.float32)}, "cloud: shape (4, 2); allowed: (n, 3)"),
     ({"cloud": np.zeros(3, np.float32)}, "cloud: shape (3,); allowed: (n, 3)"),
     ({"cloud": np.array([[0, 0, 0], [0, np.inf, 0]], np.float32)}, "cloud[1]: [0.0, inf, 0.0]; allowed: finite"),
-    ({"symmetry": "yes"}, 'symmetry: "yes"; allowed: auto, always, never'),
+    ({"symmetry": "yes"}, 'symmetry: "yes"; allowed: auto, always, never, flip'),
     ({"keep": ["roof"]}, 'keep: "roof"; allowed: duplicate-views'),
     ({"sh_degree": 4}, "sh_degree: 4; allowed: 0 to 3"),
     (

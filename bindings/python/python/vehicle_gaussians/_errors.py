@@ -23,6 +23,8 @@ class Status(enum.IntEnum):
     NOT_BUILT = 6
     #: A defect of the library.
     INTERNAL = 7
+    #: Something is needed that this machine does not have.
+    MISSING = 8
 
 
 class VgError(Exception):
