@@ -109,6 +109,10 @@ impl GaussianHead for NetworkHead {
                         opacity: g.opacity,
                         sh0: [g.sh[0], g.sh[1], g.sh[2]],
                     };
+                    if !gaussian.is_storable() {
+                        let reason = format!("a centre at {:?} m came of a run; allowed: finite", g.mean);
+                        return Err(self.model.broken("output attributes", reason));
+                    }
                     all.push_with_sh(&gaussian, &g.sh[..coefficients]);
                 }
             }

@@ -8,16 +8,20 @@ use std::path::Path;
 pub(super) enum Session {}
 
 pub(super) fn is_built() -> Result<()> {
-    Err(Error::NotBuilt {
+    Err(not_built())
+}
+
+fn not_built() -> Error {
+    Error::NotBuilt {
         argument: "model".into(),
         found: "ONNX Runtime".into(),
         remedy: "build with the feature onnx (cargo build --features onnx)".into(),
-    })
+    }
 }
 
 impl Session {
     pub(super) fn open(_: &Path, _: &ModelOptions) -> Result<(Self, Ports)> {
-        is_built().and(Err(Error::argument("model", "none", "none")))
+        Err(not_built())
     }
 
     pub(super) fn run(&mut self, _: &[Input]) -> Result<Vec<Option<Tensor>>, String> {

@@ -22,8 +22,10 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
-    /// A photograph of `width` x `height` in a picture of `size`.
-    pub(crate) fn new(width: u32, height: u32, size: (u32, u32), resize: Resize) -> Self {
+    /// A photograph of `width` x `height` in a picture of `size`; `None` if next to all of it would be cut.
+    pub(crate) fn new(width: u32, height: u32, size: (u32, u32), resize: Resize) -> Option<Self> {
+        /// Scaled photographs may be so many times the network's picture.
+        const MOST: u64 = 16;
         let (w, h) = (f64::from(width), f64::from(height));
         let resized = match resize {
             Resize::Stretch => size,
@@ -33,14 +35,18 @@ impl Fit {
                 (((w * a) as u32).max(size.0), ((h * a) as u32).max(size.1))
             }
         };
+        let area = |(w, h): (u32, u32)| u64::from(w) * u64::from(h);
+        if area(resized) > MOST * area(size) {
+            return None;
+        }
         let middle = |all: u32, kept: u32| (0.5 * f64::from(all - kept)).round_ties_even() as u32;
-        Self {
+        Some(Self {
             size,
             // Of the pictures as they are, rounded to whole pixels.
             scale: [f64::from(resized.0) / w, f64::from(resized.1) / h],
             offset: [middle(resized.0, size.0), middle(resized.1, size.1)],
             resized,
-        }
+        })
     }
 
     /// The camera of the network's picture.
@@ -99,4 +105,36 @@ pub(crate) fn ray(i: &Intrinsics, pixel: usize, width: u32) -> DVec3 {
     let (u, v) = (pixel as u32 % width, pixel as u32 / width);
     let [x, y] = i.normalized_from_pixel([f64::from(u) + 0.5, f64::from(v) + 0.5]);
     DVec3::new(x, y, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intrinsics_follow_the_pixels() {
+        // Twice as large, and 20 columns cut on each side.
+        let fit = Fit::new(100, 50, (160, 100), Resize::CoverCrop).unwrap();
+        let i = fit.intrinsics(&Intrinsics { fx: 80.0, fy: 81.0, cx: 50.0, cy: 24.0 });
+        assert_eq!((i.fx, i.fy, i.cx, i.cy), (160.0, 162.0, 80.0, 48.0));
+        let fit = Fit::new(100, 50, (160, 100), Resize::Stretch).unwrap();
+        let i = fit.intrinsics(&Intrinsics { fx: 80.0, fy: 81.0, cx: 50.0, cy: 24.0 });
+        assert_eq!((i.fx, i.fy, i.cx, i.cy), (128.0, 162.0, 80.0, 48.0));
+        assert!(Fit::new(1, 8192, (518, 392), Resize::CoverCrop).is_none());
+    }
+
+    #[test]
+    fn depth_comes_back_to_where_it_was() {
+        let fit = Fit::new(8, 4, (12, 8), Resize::CoverCrop).unwrap();
+        // Twice as large; two of 16 columns are cut on each side, which is one of 8.
+        let columns: Vec<f32> = (0..96).map(|i| 1.0 + 0.001 * (i % 12) as f32).collect();
+        let back = fit.back(&DepthMap::new(12, 8, columns).unwrap(), 8, 4).unwrap();
+        assert_eq!((back.get(0, 1), back.get(7, 2)), (None, None));
+        for u in 1..7 {
+            let expected = 1.0 + 0.001 * (2.0 * (u as f32 - 1.0) + 0.5);
+            assert!((back.get(u, 2).unwrap() - expected).abs() < 1e-5);
+        }
+        // In the middle of four pixels, the last of them is nearest.
+        assert_eq!((fit.nearest(0, 8), fit.nearest(1, 8)), (None, Some(13)));
+    }
 }

@@ -87,10 +87,14 @@ impl DepthPrior for NetworkPrior {
         let given = relative_to_first(views);
         let aspect = |v: &View| f64::from(v.camera.width) / f64::from(v.camera.height);
         let size = self.contract.size_for(views.iter().map(aspect).sum::<f64>() / views.len() as f64);
-        let fits: Vec<Fit> = views
-            .iter()
-            .map(|v| Fit::new(v.camera.width, v.camera.height, size, self.contract.resize))
-            .collect();
+        let fit = |(i, view): (usize, &View)| {
+            let (width, height) = (view.camera.width, view.camera.height);
+            Fit::new(width, height, size, self.contract.resize).ok_or_else(|| {
+                let allowed = format!("a shape nearer to the network's {} x {}", size.0, size.1);
+                Error::argument(format!("{}.image", view.argument(i)), format!("{width}x{height}"), allowed)
+            })
+        };
+        let fits: Vec<Fit> = views.iter().enumerate().map(fit).collect::<Result<_>>()?;
         let pictures: Vec<Vec<f32>> = context.parallel(|| {
             fits.par_iter().zip(views).map(|(fit, view)| fit.picture(view, &self.contract)).collect()
         });

@@ -1,4 +1,4 @@
-"""Public depth networks as ONNX files that the library can use for its ``network`` prior.
+"""Public depth networks as ONNX files that the library can use for its ``onnx`` prior.
 
 Each module is a program: ``python -m vehicle_gaussians.export.mapanything --help``.
 

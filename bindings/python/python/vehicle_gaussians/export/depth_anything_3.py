@@ -42,7 +42,7 @@ LICENCES = {
 
 
 def main(arguments: list[str] | None = None) -> int:
-    options = parser("depth_anything_3", "Depth Anything 3 as an ONNX file for the network prior", "da3.onnx")
+    options = parser("depth_anything_3", "Depth Anything 3 as an ONNX file for the prior onnx", "da3.onnx")
     add_prior_options(options, "504x378", external=True)
     add_weights_options(options, "depth-anything/DA3-BASE", ["da3-small", "da3-base", "da3-large", "da3-giant"])
     options.add_argument("--preset", metavar="NAME", help="architecture, where the name of the weights does not say it")

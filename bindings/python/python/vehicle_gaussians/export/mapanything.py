@@ -37,7 +37,7 @@ LICENCES = {
 
 
 def main(arguments: list[str] | None = None) -> int:
-    options = parser("mapanything", "MapAnything as an ONNX file for the network prior", "mapanything.onnx")
+    options = parser("mapanything", "MapAnything as an ONNX file for the prior onnx", "mapanything.onnx")
     add_prior_options(options, "518x392", external=True)
     add_weights_options(options, "facebook/map-anything-apache", ["giant", "small"])
     chosen = options.parse_args(arguments)
