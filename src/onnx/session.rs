@@ -105,7 +105,8 @@ fn port(outlet: &Outlet) -> Port {
 
 /// The runtime's words in one line.
 fn words<R>(error: &ort::Error<R>) -> String {
-    error.message().split_whitespace().collect::<Vec<_>>().join(" ")
+    let line = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
+    line.trim_end_matches('.').to_owned()
 }
 
 fn lent<'a>(input: &Input<'a>) -> ort::Result<(&'a str, SessionInputValue<'a>)> {

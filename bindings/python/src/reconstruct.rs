@@ -66,6 +66,8 @@ pub(crate) fn reconstruct<'py>(
         max_views,
         threads,
         points,
+        // Models are not lent to Python yet.
+        ..Options::default()
     };
     // Before the pixels are copied.
     options.validate().map_err(|e| from_library(py, e))?;
