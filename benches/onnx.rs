@@ -87,7 +87,6 @@ fn main() -> Result<()> {
     println!(
         "  here {here:.3} s (first {first:.3}), Python {there:.3} s (first {first_theirs:.3}), ratio {ratio:.3}"
     );
-    drop(theirs);
     drop(ask);
     let _ = child.wait();
 
