@@ -295,8 +295,11 @@ def test_progress_cancels_logs_and_passes_exceptions_through(ellipsoid: Views) -
 
 
 def test_ctrl_c_stops_a_reconstruction_through_ctypes() -> None:
+    # A shell that starts its jobs in the background has them ignore Ctrl-C.
     code = f"""
+import signal
 from vehicle_gaussians import capi
+signal.signal(signal.SIGINT, signal.default_int_handler)
 scene = capi.open_scene({str(SEDAN)!r}, load_depth=False)
 context = capi.Context(1)
 print("ready", flush=True)

@@ -104,8 +104,11 @@ def test_an_exception_of_the_progress_function_passes_through(ellipsoid: Views) 
 
 
 def test_ctrl_c_stops_a_reconstruction() -> None:
+    # A shell that starts its jobs in the background has them ignore Ctrl-C.
     code = f"""
+import signal
 import vehicle_gaussians as vg
+signal.signal(signal.SIGINT, signal.default_int_handler)
 scene = vg.open_scene({str(SEDAN)!r}, load_depth=False)
 print("ready", flush=True)
 while True:
