@@ -27,6 +27,11 @@ impl Intrinsics {
         self.fx.min(self.fy)
     }
 
+    /// The matrix K, row-major.
+    pub(crate) fn to_row_major(self) -> [f64; 9] {
+        [self.fx, 0.0, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0]
+    }
+
     /// Pixel coordinates of normalised ones (x/z, y/z).
     pub fn pixel_from_normalized(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.fx * x + self.cx, self.fy * y + self.cy]

@@ -64,17 +64,14 @@ impl Contract {
         let offset = ports.one_of("vg.offset", &offsets, Some(Offset::Applied))?;
         let multiple = ports.count("vg.size_multiple", 1)?;
         // One view at a time is shown, as large as it is.
-        let images = ports.input("images", &[Some(1), Some(3), None, None])?;
-        let images = images.ok_or_else(|| Broken::new("input images", "missing"))?;
+        let images = ports.required_input("images", &[Some(1), Some(3), None, None])?;
         if images[2].is_some() || images[3].is_some() {
             return Err(Broken::new("input images", "of a fixed size; allowed: any height and width"));
         }
-        let depth = ports.input("depth", &[Some(1), None, None])?;
-        depth.ok_or_else(|| Broken::new("input depth", "missing"))?;
+        ports.required_input("depth", &[Some(1), None, None])?;
         let takes_intrinsics = ports.input("intrinsics", &[Some(1), Some(3), Some(3)])?.is_some();
         ports.no_inputs_but(&["images", "depth", "intrinsics"])?;
-        let attributes = ports.output("attributes", &[Some(1), Some(CHANNELS), None, None])?;
-        let attributes = attributes.ok_or_else(|| Broken::new("output attributes", "missing"))?;
+        let attributes = ports.required_output("attributes", &[Some(1), Some(CHANNELS), None, None])?;
         Ok(Self { activation, offset, multiple, takes_intrinsics, attributes })
     }
 }
@@ -146,8 +143,7 @@ impl NetworkHead {
                 images[c * width * height + at] = f32::from(*value) / 255.0;
             }
         }
-        let k = view.camera.intrinsics;
-        let intrinsics = [k.fx, 0.0, k.cx, 0.0, k.fy, k.cy, 0.0, 0.0, 1.0].map(|x| x as f32);
+        let intrinsics = view.camera.intrinsics.to_row_major().map(|x| x as f32);
         let (image_shape, depth_shape) = ([1, 3, height, width], [1, height, width]);
         let mut inputs = vec![
             Input { name: "images", shape: &image_shape, data: &images },
@@ -157,19 +153,9 @@ impl NetworkHead {
             inputs.push(Input { name: "intrinsics", shape: &[1, 3, 3], data: &intrinsics });
         }
         let mut outputs = self.model.run(&inputs)?;
-        let expected = [1, CHANNELS, height, width];
-        let field = "output attributes";
-        match outputs[self.contract.attributes].take() {
-            Some(tensor) if tensor.shape != expected => {
-                let reason = format!("shape {:?} came of a run; allowed: {expected:?}", tensor.shape);
-                Err(self.model.broken(field, reason))
-            }
-            Some(tensor) => match tensor.data.iter().find(|v| !v.is_finite()) {
-                Some(v) => Err(self.model.broken(field, format!("{v} came of a run; allowed: finite"))),
-                None => Ok(Frame { width, height, raw: tensor.data }),
-            },
-            None => Err(self.model.broken(field, "not a tensor of float32")),
-        }
+        let shape = [1, CHANNELS, height, width];
+        let raw = self.model.output(&mut outputs, self.contract.attributes, &shape)?;
+        Ok(Frame { width, height, raw })
     }
 
     fn gaussian(

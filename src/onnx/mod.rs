@@ -128,6 +128,27 @@ impl Model {
         session.run(inputs).map_err(|reason| self.broken("run", reason))
     }
 
+    /// Takes one of the outputs of a run: of the promised shape, all finite, or an error that names it.
+    pub(crate) fn output(
+        &self,
+        outputs: &mut [Option<Tensor>],
+        at: usize,
+        shape: &[usize],
+    ) -> Result<Vec<f32>> {
+        let field = format!("output {}", self.ports().outputs[at].name);
+        let Some(tensor) = outputs[at].take() else {
+            return Err(self.broken(field, "not a tensor of float32"));
+        };
+        if tensor.shape != shape {
+            let reason = format!("shape {:?} came of a run; allowed: {shape:?}", tensor.shape);
+            return Err(self.broken(field, reason));
+        }
+        match tensor.data.iter().find(|v| !v.is_finite()) {
+            Some(value) => Err(self.broken(field, format!("{value} came of a run; allowed: finite"))),
+            None => Ok(tensor.data),
+        }
+    }
+
     /// An error about this model.
     pub fn broken(&self, field: impl Into<String>, reason: impl Into<String>) -> Error {
         Error::format(&self.inner.path, field, reason)

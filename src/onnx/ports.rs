@@ -54,6 +54,16 @@ impl Ports {
         found.map(|at| self.outputs[at].fitting("output", expected).map(|_| at)).transpose()
     }
 
+    /// The same of an input that must be there.
+    pub(crate) fn required_input(&self, name: &str, expected: &Dimensions) -> Checked<&Dimensions> {
+        self.input(name, expected)?.ok_or_else(|| Broken::new(format!("input {name}"), "missing"))
+    }
+
+    /// The same of an output that must be there.
+    pub(crate) fn required_output(&self, name: &str, expected: &Dimensions) -> Checked<usize> {
+        self.output(name, expected)?.ok_or_else(|| Broken::new(format!("output {name}"), "missing"))
+    }
+
     /// Nobody would feed another.
     pub(crate) fn no_inputs_but(&self, known: &[&str]) -> Checked<()> {
         match self.inputs.iter().find(|p| !known.contains(&p.name.as_str())) {

@@ -86,13 +86,10 @@ const HELD: f64 = 1.0;
 pub(super) fn fit_views(views: &[View], depths: &[DepthMap]) -> Option<ViewFit> {
     let pairs = pairs(views, depths);
     let n = views.len();
-    let median = |b: &DVector<f64>| {
-        let mut all: Vec<f64> = pairs.iter().map(|p| (p.ratio - b[p.from] + b[p.to]).abs()).collect();
-        let middle = all.len() / 2;
-        (!all.is_empty()).then(|| *all.select_nth_unstable_by(middle, f64::total_cmp).1)
-    };
+    let typical =
+        |b: &DVector<f64>| median(pairs.iter().map(|p| (p.ratio - b[p.from] + b[p.to]).abs()).collect());
     let mut b = DVector::zeros(n);
-    let before = median(&b)?;
+    let before = typical(&b)?;
     const ROUNDS: usize = 10;
     for _ in 0..ROUNDS {
         let mut normal = DMatrix::identity(n, n) * HELD;
@@ -109,10 +106,16 @@ pub(super) fn fit_views(views: &[View], depths: &[DepthMap]) -> Option<ViewFit> 
         }
         b = normal.cholesky()?.solve(&right);
     }
-    let after = median(&b)?;
+    let after = typical(&b)?;
     let better = after < before;
     let scales = b.iter().map(|b| if better { b.exp() } else { 1.0 }).collect();
     Some(ViewFit { scales, before, after: if better { after } else { before } })
+}
+
+/// The upper one of two in the middle; `None` of nothing.
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// View `to` sees, in the direction where view `from` has a surface, another depth: ln(its depth / the projected).

@@ -95,8 +95,7 @@ impl Contract {
             return Err(Broken::new("metadata vg.std", format!("{std:?}; allowed: no zeros")));
         }
 
-        let images = ports.input("images", &[None, Some(3), None, None])?;
-        let images = images.ok_or_else(|| Broken::new("input images", "missing"))?;
+        let images = ports.required_input("images", &[None, Some(3), None, None])?;
         let size = match (images[2], images[3]) {
             (Some(height), Some(width)) => {
                 let side = |n: usize| u32::try_from(n).ok().filter(|n| (1..=8192).contains(n));
@@ -124,9 +123,8 @@ impl Contract {
 
         let (height, width) = (images[2], images[3]);
         let map = [views, height, width];
-        let depth_at = ports.output("depth", &map)?.ok_or_else(|| Broken::new("output depth", "missing"))?;
         let outputs = Outputs {
-            depth: depth_at,
+            depth: ports.required_output("depth", &map)?,
             rays: ports.output("rays", &[views, height, width, Some(3)])?,
             scale: ports.output("scale", &[Some(1)])?,
             confidence: ports.output("confidence", &map)?,

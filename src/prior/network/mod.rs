@@ -14,11 +14,11 @@ pub use agreement::{PoseFit, ViewFit};
 use super::{DepthPrior, Geometry};
 use crate::error::{Error, Result};
 use crate::geometry::Pose;
-use crate::onnx::{Input, Model, Tensor};
+use crate::onnx::{Input, Model};
 use crate::progress::Context;
 use crate::scene::mask::Label;
 use crate::scene::{DepthMap, View};
-use agreement::{fit_poses, fit_views};
+use agreement::{fit_poses, fit_views, median};
 use contract::{Contract, DepthKind};
 use fit::{Fit, ray};
 use glam::{DMat3, DVec3};
@@ -116,12 +116,12 @@ impl DepthPrior for NetworkPrior {
         let small: Vec<Vec<f32>> = (0..views.len()).map(|i| self.planar(&said, i, &fits[i], views)).collect();
         told.ray_degrees = self.ray_error(&said, &fits, views)?;
         let scale = self.scale(&said, &given, &mut told)?;
-        let mut depths = full_size(&small, &fits, views, |_| scale)?;
+        let mut depths = context.parallel(|| full_size(&small, &fits, views, |_| scale))?;
         told.views = context.parallel(|| fit_views(views, &depths));
         if let Some(fit) = told.views.as_ref().filter(|fit| fit.after < fit.before) {
-            depths = full_size(&small, &fits, views, |i| scale * fit.scales[i])?;
+            depths = context.parallel(|| full_size(&small, &fits, views, |i| scale * fit.scales[i]))?;
         }
-        if let Some(rank) = said.confidence_ranks() {
+        if let Some(rank) = context.parallel(|| said.confidence_ranks()) {
             depths = ranked(depths, &rank, &fits, views)?;
         }
         let none = |(view, depth): (&View, &DepthMap)| {
@@ -173,7 +173,7 @@ impl NetworkPrior {
             .zip(fits)
             .flat_map(|(view, fit)| {
                 let i = fit.intrinsics(&view.camera.intrinsics);
-                [i.fx, 0.0, i.cx, 0.0, i.fy, i.cy, 0.0, 0.0, 1.0]
+                i.to_row_major()
             })
             .map(|x| x as f32)
             .collect();
@@ -191,8 +191,7 @@ impl NetworkPrior {
             inputs.push(Input { name: "cam_to_ref", shape: &pose_shape, data: &poses });
         }
         let mut outputs = self.model.run(&inputs)?;
-        let names = &self.model.ports().outputs;
-        let mut take = |at: usize, shape: &[usize]| self.checked(&names[at].name, outputs[at].take(), shape);
+        let mut take = |at: usize, shape: &[usize]| self.model.output(&mut outputs, at, shape);
         let at = self.contract.outputs;
         let map = [n, height, width];
         let poses = at.poses.map(|at| take(at, &[n, 4, 4])).transpose()?;
@@ -208,20 +207,6 @@ impl NetworkPrior {
         };
         self.check(&said)?;
         Ok(said)
-    }
-
-    /// An output of the promised shape, all finite.
-    fn checked(&self, name: &str, tensor: Option<Tensor>, shape: &[usize]) -> Result<Vec<f32>> {
-        let field = format!("output {name}");
-        let Some(tensor) = tensor else { return Err(self.model.broken(field, "not a tensor of float32")) };
-        if tensor.shape != shape {
-            let reason = format!("shape {:?} came of a run; allowed: {shape:?}", tensor.shape);
-            return Err(self.model.broken(field, reason));
-        }
-        match tensor.data.iter().find(|v| !v.is_finite()) {
-            Some(value) => Err(self.model.broken(field, format!("{value} came of a run; allowed: finite"))),
-            None => Ok(tensor.data),
-        }
     }
 
     fn poses(&self, numbers: &[f32]) -> Result<Vec<Pose>> {
@@ -292,11 +277,7 @@ impl NetworkPrior {
                 angles.push(found.cross(expected).length().atan2(found.dot(expected)).to_degrees());
             }
         }
-        if angles.is_empty() {
-            return Ok(None);
-        }
-        let middle = angles.len() / 2;
-        let median = *angles.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let Some(median) = median(angles) else { return Ok(None) };
         if median > MOST_RAY_DEGREES {
             let reason = format!(
                 "the network's rays lean by {median:.1} degrees from those of the intrinsics (at most \
