@@ -29,6 +29,8 @@ mod camera;
 
 mod view;
 
+mod model;
+
 mod options;
 
 mod report;
@@ -48,6 +50,7 @@ pub use camera::*;
 pub use context::*;
 pub use gaussians::*;
 pub use image::*;
+pub use model::*;
 pub use options::*;
 pub use reconstruct::*;
 pub use render::*;

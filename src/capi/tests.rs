@@ -45,10 +45,11 @@ fn layout_of_rust() -> String {
         vg_image_target {
             struct_size width height color color_row_stride depth depth_row_stride color_format flags
         }
+        vg_model_options { struct_size runtime provider fall_back threads prepack arena flags }
         vg_options {
             struct_size context prior symmetry sh_degree keep check points vehicle_size progress progress_user log
             log_user calibrate relight photo flags budget_s cloud cloud_count resolution
-            max_views
+            max_views prior_model head_model
         }
         vg_render_options {
             struct_size context backend background background_color alpha depth_mode sh_degree antialiased blur
@@ -102,7 +103,9 @@ fn numbers_of_rust() -> BTreeSet<String> {
         vg_format { Rgb8 Bgr8 Rgba8 Bgra8 Gray8 Rgba32f Depth32f }
         vg_keep { DuplicateViews Overlap SilhouetteEdge Floaters ShBands }
         vg_log_level { Warning Info Debug }
+        vg_prepack { Auto Always Never }
         vg_prior { Auto Given Hull Onnx Shape }
+        vg_provider { Cpu Cuda }
         vg_relight { Auto Never }
         vg_status { Ok Argument Format Io Reconstruction Cancelled NotBuilt Internal Missing }
         vg_symmetry { Auto Always Never Flip }
@@ -193,6 +196,9 @@ fn every_function() -> Vec<(&'static str, Call)> {
         vg_pose_from_opengl(null(), null(), null_mut()) reports;
         vg_pose_from_box(null(), null(), null_mut()) reports;
         vg_view_init(null_mut(), 0) status;
+        vg_model_options_init(null_mut(), 0) status;
+        vg_model_open(null(), null(), null_mut()) reports;
+        vg_model_free(null_mut()) none;
         vg_options_init(null_mut(), 0) status;
         vg_report_figures_init(null_mut(), 0) status;
         vg_report_get_figures(null(), null_mut()) reports;

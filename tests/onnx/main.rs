@@ -8,6 +8,7 @@ mod common;
 mod graph;
 mod oracle;
 
+mod c_abi;
 mod contract;
 mod depth;
 mod head;
