@@ -4,6 +4,7 @@ use crate::arrays::{array, owned, shape_text, values};
 use crate::camera::Camera;
 use crate::errors::{bad_type, bad_value, detached, from_library};
 use crate::gaussians::Gaussians;
+use crate::model::Model;
 use numpy::{PyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -24,8 +25,8 @@ type Points<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>);
 /// The Gaussians, the report as JSON, and the points if asked for.
 #[pyfunction]
 #[pyo3(signature = (
-    images, masks, cameras, depths, *, prior, calibrate, symmetry, relight, photo, cloud, vehicle_size, sh_degree, keep,
-    check, points, budget, resolution, max_views, threads, names, progress
+    images, masks, cameras, depths, *, prior, prior_model, head_model, calibrate, symmetry, relight, photo, cloud,
+    vehicle_size, sh_degree, keep, check, points, budget, resolution, max_views, threads, names, progress
 ))]
 pub(crate) fn reconstruct<'py>(
     py: Python<'py>,
@@ -34,6 +35,8 @@ pub(crate) fn reconstruct<'py>(
     cameras: Vec<Bound<'py, PyAny>>,
     depths: Option<Vec<Bound<'py, PyAny>>>,
     prior: &str,
+    prior_model: Option<Bound<'py, Model>>,
+    head_model: Option<Bound<'py, Model>>,
     calibrate: &str,
     symmetry: &str,
     relight: &str,
@@ -53,6 +56,8 @@ pub(crate) fn reconstruct<'py>(
 ) -> PyResult<(Gaussians, String, Option<Points<'py>>)> {
     let options = Options {
         prior: parse_prior(py, prior)?,
+        prior_model: prior_model.map(|model| model.get().inner.clone()),
+        head_model: head_model.map(|model| model.get().inner.clone()),
         calibrate: parse_calibrate(py, calibrate)?,
         symmetry: parse_symmetry(py, symmetry)?,
         relight: parse_relight(py, relight)?,
@@ -66,8 +71,6 @@ pub(crate) fn reconstruct<'py>(
         max_views,
         threads,
         points,
-        // Models are not lent to Python yet.
-        ..Options::default()
     };
     // Before the pixels are copied.
     options.validate().map_err(|e| from_library(py, e))?;
@@ -261,7 +264,8 @@ fn parse_prior(py: Python<'_>, name: &str) -> PyResult<PriorChoice> {
         "given" => Ok(PriorChoice::Given),
         "hull" => Ok(PriorChoice::Hull),
         "shape" => Ok(PriorChoice::Shape),
-        other => Err(bad_value(py, "prior", &format!("{other:?}"), "auto, given, hull, shape")),
+        "onnx" => Ok(PriorChoice::Onnx),
+        other => Err(bad_value(py, "prior", &format!("{other:?}"), "auto, given, hull, shape, onnx")),
     }
 }
 

@@ -15,6 +15,7 @@ from ._errors import Status, VgError
 from ._native import (
     Camera,
     Gaussians,
+    Model,
     __version__,
     pose_from_box,
     pose_from_colmap,
@@ -27,6 +28,7 @@ from ._scene import Scene, open_scene
 __all__ = [
     "Camera",
     "Gaussians",
+    "Model",
     "Points",
     "Reconstruction",
     "Scene",
