@@ -20,6 +20,10 @@ const PROBABLE: f32 = 0.5;
 /// of a large van. Of longer ones most pixels do.
 const REACH_M: f64 = 3.0;
 
+/// Pieces of one vehicle are no farther apart than this share of the largest piece's diagonal: a tree takes less of a
+/// car, the gap between two parked ones more.
+const GAP_SHARE: f64 = 0.08;
+
 /// Holes smaller than this share of the vehicle are filled: one pixel of background is a hole through the hull.
 const HOLE_SHARE: f64 = 0.02;
 
@@ -138,10 +142,14 @@ fn the_vehicle(mut labels: Vec<Label>, camera: &Camera) -> Vec<Label> {
     // The pixels of each patch, and how many of them can show the vehicle.
     let near: Vec<usize> = patches.par_iter().map(|p| p.iter().filter(|&&i| is_near(i)).count()).collect();
     let best = (0..patches.len()).max_by_key(|&k| (near[k], std::cmp::Reverse(k))).filter(|&k| near[k] > 0);
+    let bounds: Vec<[usize; 4]> = patches.iter().map(|patch| bounds(patch, width)).collect();
+    // Posts and trees cut a vehicle in pieces.
+    let is_piece = |k: usize, best: usize| {
+        2 * near[k] > patches[k].len() && gap(bounds[k], bounds[best]) <= GAP_SHARE * diagonal(bounds[best])
+    };
     let mut size = 0;
     for (k, patch) in patches.iter().enumerate() {
-        // Posts and trees cut a vehicle in pieces.
-        if Some(k) == best || 2 * near[k] > patch.len() {
+        if best.is_some_and(|best| k == best || is_piece(k, best)) {
             size += patch.len();
         } else {
             patch.iter().for_each(|&i| labels[i] = Label::Background);
@@ -171,6 +179,24 @@ fn passes_near(camera: &Camera, pixel: usize, center: DVec3) -> bool {
     // From inside the reach every direction may show it.
     let closest = center - ray * along.max(0.0);
     closest.length() <= REACH_M
+}
+
+/// First and last column and row: `[u0, v0, u1, v1]`.
+fn bounds(patch: &[usize], width: usize) -> [usize; 4] {
+    patch.iter().fold([usize::MAX, usize::MAX, 0, 0], |[u0, v0, u1, v1], i| {
+        let (u, v) = (i % width, i / width);
+        [u0.min(u), v0.min(v), u1.max(u), v1.max(v)]
+    })
+}
+
+/// Pixels between two boxes along the axis on which there are more.
+fn gap(a: [usize; 4], b: [usize; 4]) -> f64 {
+    let between = |k: usize| a[k].saturating_sub(b[k + 2]).max(b[k].saturating_sub(a[k + 2])) as f64;
+    between(0).max(between(1))
+}
+
+fn diagonal([u0, v0, u1, v1]: [usize; 4]) -> f64 {
+    ((u1 - u0) as f64).hypot((v1 - v0) as f64)
 }
 
 /// Pixels of a label that hang together by their sides, a list for each patch, in the order of their first pixels.
@@ -245,8 +271,17 @@ mod tests {
 
     #[test]
     fn a_post_before_the_vehicle_leaves_both_pieces() {
-        let pieces = drawn(["........", "........", ".##.###.", ".##.###.", "........", "........"]);
+        let mut pieces = drawn(["........", "........", ".######.", ".######.", "........", "........"]);
+        for v in 20..40 {
+            pieces[v * WIDTH as usize + 40..][..2].fill(Label::Background);
+        }
         assert!(the_vehicle(pieces.clone(), &camera()) == pieces);
+        // A gap of ten pixels is one between two cars.
+        let two = drawn(["........", "........", "#.#####.", "#.#####.", "........", "........"]);
+        assert!(
+            the_vehicle(two, &camera())
+                == drawn(["........", "........", "..#####.", "..#####.", "........", "........"])
+        );
     }
 
     #[test]
