@@ -13,6 +13,7 @@ mod contract;
 mod depth;
 mod head;
 mod program;
+mod segment;
 
 use graph::Graph;
 use std::path::{Path, PathBuf};
