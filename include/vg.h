@@ -1214,6 +1214,24 @@ typedef struct vg_image_target {
 } vg_image_target;
 
 /**
+ * Settings of `vg_segment`.
+ */
+typedef struct vg_segment_options {
+    /**
+     * `sizeof(vg_segment_options)`.
+     */
+    size_t struct_size;
+    /**
+     * Threads to use. NULL: made for this call, one per core; make one where pictures follow each other.
+     */
+    struct vg_context *context;
+    /**
+     * Reserved: 0.
+     */
+    uint64_t flags;
+} vg_segment_options;
+
+/**
  * What of a scene is wanted, and what its files do not say.
  */
 typedef struct vg_scene_options {
@@ -1747,6 +1765,40 @@ vg_status vg_render(const struct vg_gaussians *gaussians,
                     const struct vg_render_options *options,
                     const struct vg_image_target *target,
                     struct vg_error **out_error);
+
+/**
+ * Sets `*options` to the default values. `size`: `sizeof *options`.
+ */
+VG_API
+vg_status vg_segment_options_init(struct vg_segment_options *options,
+                                  size_t size);
+
+/**
+ * Makes the mask of a photograph that has none. The network tells which pixels show a vehicle, the camera which of
+ * them is the one that stands at the origin of its vehicle frame: cars beside it and behind it are not in the mask.
+ * All 0 where the network sees none there.
+ *
+ * - model: a segmentation network; not NULL.
+ * - image: RGB8, BGR8, RGBA8, BGRA8 or GRAY8; alpha is not looked at. Not NULL.
+ * - camera: of the image; not NULL.
+ * - options: NULL for the default values.
+ * - out_mask: one byte per pixel of the image, the top row first: 255 is the vehicle, 0 everything else and what a
+ *   network that cuts off the sides was not shown. Ready to be the GRAY8 mask of a `vg_view`. Not NULL; written on
+ *   success only.
+ * - row_stride: bytes from one row of `out_mask` to the next; 0: rows without gaps. What lies between rows is not
+ *   touched.
+ * - out_error: NULL, or receives the error.
+ *
+ * `VG_STATUS_NOT_BUILT` in a build without networks.
+ */
+VG_API
+vg_status vg_segment(const struct vg_model *model,
+                     const struct vg_image *image,
+                     const struct vg_camera *camera,
+                     const struct vg_segment_options *options,
+                     uint8_t *out_mask,
+                     size_t row_stride,
+                     struct vg_error **out_error);
 
 /**
  * Sets `*options` to the default values. `size`: `sizeof *options`.

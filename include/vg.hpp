@@ -25,7 +25,7 @@
  *            vg_image and a Span own nothing: they point into a Scene, a cv::Mat or Gaussians, which must
  *            outlive them.
  *
- * Options.   Options, ModelOptions, RenderOptions, SceneOptions are the structs of vg.h with their default values set.
+ * Options.   Options, ModelOptions, SegmentOptions, RenderOptions, SceneOptions are the structs of vg.h with their default values set.
  *            Their fields are explained there.
  *
  * Callbacks. on_progress and on_log take any callable. They come on the calling thread, one at a time. An
@@ -633,6 +633,29 @@ class Model {
     std::unique_ptr<vg_model, detail::Free> handle_;
 };
 
+/// Settings of a mask.
+struct SegmentOptions : vg_segment_options {
+    SegmentOptions() noexcept : vg_segment_options{} {
+        vg_segment_options_init(this, sizeof(vg_segment_options));
+    }
+};
+
+/// The mask of a photograph that has none, by a segmentation network: one byte per pixel, rows without gaps, 255
+/// where the vehicle is that stands at the origin of the camera's vehicle frame.
+inline Result<std::vector<std::uint8_t>> segment(const Model &model, const vg_image &photograph,
+                                                 const vg_camera &camera, const SegmentOptions &options = {}) {
+    // A picture of no sensible size is the library's to refuse, before memory is asked for.
+    const bool sensible = photograph.width <= 8192 && photograph.height <= 8192;
+    std::vector<std::uint8_t> mask(sensible ? std::size_t{photograph.width} * photograph.height : 0);
+    const Result<void> made = detail::done([&](vg_error **error) {
+        return vg_segment(model.get(), &photograph, &camera, &options, mask.data(), 0, error);
+    });
+    if (!made) {
+        return made.error();
+    }
+    return mask;
+}
+
 // ---- Reconstruction
 
 /// Settings of a reconstruction.
@@ -872,6 +895,23 @@ inline Result<vg_image> image(LentMat mat) {
 inline Result<vg_image> image_rgb(LentMat mat) {
     static constexpr detail::MatFormat formats[] = {{CV_8UC3, VG_FORMAT_RGB8}, {CV_8UC4, VG_FORMAT_RGBA8}};
     return detail::lent("image", mat.get(), formats, "CV_8UC3 (RGB), CV_8UC4 (RGBA)");
+}
+
+/// The mask of a photograph that has none, CV_8UC1, by a segmentation network.
+inline Result<cv::Mat> segment(const Model &model, LentMat photograph, const vg_camera &camera,
+                               const SegmentOptions &options = {}) {
+    const Result<vg_image> pixels = image(photograph);
+    if (!pixels) {
+        return pixels.error();
+    }
+    cv::Mat mask(photograph.get().rows, photograph.get().cols, CV_8UC1);
+    const Result<void> made = detail::done([&](vg_error **error) {
+        return vg_segment(model.get(), &*pixels, &camera, &options, mask.data, mask.step, error);
+    });
+    if (!made) {
+        return made.error();
+    }
+    return mask;
 }
 
 /// A mask: 128 and above is vehicle.

@@ -41,6 +41,8 @@ mod reconstruct;
 
 mod render;
 
+mod segment;
+
 mod scene;
 
 #[cfg(test)]
@@ -56,6 +58,7 @@ pub use reconstruct::*;
 pub use render::*;
 pub use report::*;
 pub use scene::*;
+pub use segment::*;
 pub use status::*;
 pub use version::*;
 pub use view::*;

@@ -64,6 +64,7 @@ fn layout_of_rust() -> String {
         vg_scene_options {
             struct_size context vehicle_from_world names name_count depth_scale load_depth flags log log_user
         }
+        vg_segment_options { struct_size context flags }
         vg_view { struct_size name camera image mask depth }
     }
     lines
@@ -127,13 +128,21 @@ fn vg_abi_witness(
     _: &vg_context_options,
     _: &vg_gaussian_arrays,
     _: &vg_image_target,
+    _: &vg_model_options,
     _: &vg_options,
 ) {
 }
 
 /// The rest: a function of the witness takes few arguments.
 #[safer_ffi::ffi_export]
-fn vg_abi_witness_more(_: &vg_render_options, _: &vg_report_figures, _: &vg_scene_options, _: &vg_view) {}
+fn vg_abi_witness_more(
+    _: &vg_render_options,
+    _: &vg_report_figures,
+    _: &vg_scene_options,
+    _: &vg_segment_options,
+    _: &vg_view,
+) {
+}
 
 /// safer-ffi derives each struct's C form from the compiled type, by traits that only FFI-safe types have; cbindgen
 /// reads the source text. Neither knows of the other.
@@ -226,6 +235,8 @@ fn every_function() -> Vec<(&'static str, Call)> {
         vg_render_options_init(null_mut(), 0) status;
         vg_image_target_init(null_mut(), 0) status;
         vg_render(null(), null(), null(), null()) reports;
+        vg_segment_options_init(null_mut(), 0) status;
+        vg_segment(null(), null(), null(), null(), null_mut(), 0) reports;
         vg_scene_options_init(null_mut(), 0) status;
         vg_colmap_open(null(), null(), null_mut()) reports;
         vg_transforms_open(null(), null(), null_mut()) reports;

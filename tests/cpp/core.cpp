@@ -195,6 +195,14 @@ void models_are_opened_and_lent() {
     CHECK(options.prior_model == nullptr && options.prior == VG_PRIOR_ONNX);
     CHECK(failed(vg::reconstruct({photographs.view()}, options),
                  built ? VG_STATUS_ARGUMENT : VG_STATUS_NOT_BUILT, "options.prior"));
+
+    const vg_view view = photographs.view();
+    CHECK(failed(vg::segment(empty, view.image, view.camera),
+                 built ? VG_STATUS_ARGUMENT : VG_STATUS_NOT_BUILT, "model"));
+    CHECK(failed(vg::segment(empty, vg_image{}, view.camera), VG_STATUS_ARGUMENT, "image.data"));
+    vg_image odd = view.image;
+    odd.width = 4000000000;
+    CHECK(failed(vg::segment(empty, odd, view.camera), VG_STATUS_ARGUMENT, "image: 4000000000"));
 }
 
 void callbacks_stop_a_reconstruction() {

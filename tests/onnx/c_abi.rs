@@ -6,6 +6,7 @@ use crate::common::vehicle::{right_side, without_depth};
 use crate::file;
 use crate::head::constant;
 use crate::oracle::{Manner, ellipsoid};
+use crate::segment::{black_and_white, brightness};
 use std::ffi::{CStr, CString};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -15,6 +16,7 @@ use std::time::Instant;
 use vg::capi::*;
 use vg::onnx::{Model, ModelOptions};
 use vg::pipeline::{Options, PriorChoice, Reconstruction, reconstruct};
+use vg::scene::Segmenter;
 use vg::{Scene, View};
 
 const WIDTH: u32 = 96;
@@ -303,6 +305,59 @@ fn what_does_not_go_together_is_refused_by_the_names_of_the_header() {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml");
     let (status, words) = opened_with(&manifest, &model_options(1)).err().unwrap();
     assert!(status == vg_status::Format && words.contains("Cargo.toml: model: "), "{words}");
+}
+
+#[test]
+fn a_mask_of_c_is_that_of_rust() {
+    let view = &right_side(WIDTH, HEIGHT).views[1];
+    let (graph, path) = (brightness(Some((64, 64))), file("c-mask"));
+    graph.write(&path);
+    let Some(model) = opened(&path) else { return };
+    let picture = black_and_white(view, true);
+    let shown = View { image: picture.clone(), ..view.clone() };
+    let rust = Segmenter::new(crate::open("rust-mask", &graph).unwrap()).unwrap();
+    let expected = rust.mask(&picture, &view.camera).unwrap();
+    assert!(expected.vehicle_pixels() > 500);
+
+    let lent = lent(&shown);
+    let (width, stride) = (WIDTH as usize, WIDTH as usize + 7);
+    let segment = |picture: &vg_image, mask: &mut [u8]| unsafe {
+        let mut error = null_mut();
+        let (to, camera) = (mask.as_mut_ptr(), &raw const lent.camera);
+        match vg_segment(model.0, picture, camera, null(), to, stride, &raw mut error) {
+            vg_status::Ok => Ok(()),
+            status => Err(refusal(status, error)),
+        }
+    };
+    // One row after another, the last without a gap behind it.
+    let mut mask = vec![77u8; stride * (HEIGHT as usize - 1) + width];
+    segment(&lent.image, &mut mask).unwrap();
+    for (v, row) in mask.chunks(stride).enumerate() {
+        for (u, byte) in row.iter().enumerate() {
+            let wanted = match u < width {
+                true if expected.is_vehicle(u as u32, v as u32) => 255,
+                true => 0,
+                false => 77,
+            };
+            assert_eq!(*byte, wanted, "column {u}, row {v}");
+        }
+    }
+
+    let mut untouched = vec![77u8; mask.len()];
+    let half = vg_image { height: HEIGHT / 2, ..lent.image };
+    let (status, words) = segment(&half, &mut untouched).unwrap_err();
+    assert_eq!(status, vg_status::Argument);
+    assert!(words.starts_with("image: 96x36; allowed: the camera's size, 96x72"), "{words}");
+    let [prior, _] = written("no-mask", &right_side(WIDTH, HEIGHT));
+    let prior = opened(&prior).unwrap();
+    let mut error = null_mut();
+    let (status, words) = unsafe {
+        let (camera, to) = (&raw const lent.camera, untouched.as_mut_ptr());
+        let status = vg_segment(prior.0, &raw const lent.image, camera, null(), to, stride, &raw mut error);
+        refusal(status, error)
+    };
+    assert!(status == vg_status::Format && words.contains("a geometry prior, no segmentation"), "{words}");
+    assert!(untouched.iter().all(|&byte| byte == 77));
 }
 
 /// Threads of this process.

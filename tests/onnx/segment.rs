@@ -13,7 +13,7 @@ const WIDTH: u32 = 96;
 const HEIGHT: u32 = 72;
 
 /// The probability is the mean of the channels; `side` fixed, or free with a long side of 64.
-fn brightness(sides: Option<(u64, u64)>) -> Graph {
+pub(crate) fn brightness(sides: Option<(u64, u64)>) -> Graph {
     let mut g = Graph::default();
     let (h, w) = (sides.map(|s| s.1), sides.map(|s| s.0));
     g.inputs = vec![Port::new("images", &[None, Some(3), h, w])];
@@ -28,7 +28,7 @@ fn brightness(sides: Option<(u64, u64)>) -> Graph {
 }
 
 /// White where the vehicle is, and a white car to the left of it.
-fn black_and_white(view: &View, neighbour: bool) -> RgbImage {
+pub(crate) fn black_and_white(view: &View, neighbour: bool) -> RgbImage {
     let mask = view.mask.as_ref().unwrap();
     let pixel = |i: u32| {
         let (u, v) = (i % WIDTH, i / WIDTH);

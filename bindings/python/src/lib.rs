@@ -24,7 +24,7 @@ mod _native {
     #[pymodule_export]
     use crate::gaussians::Gaussians;
     #[pymodule_export]
-    use crate::model::Model;
+    use crate::model::{Model, segment};
     #[pymodule_export]
     use crate::reconstruct::reconstruct;
     #[pymodule_export]

@@ -1,9 +1,15 @@
 //! Networks in ONNX files.
 
-use crate::errors::{bad_value, detached};
+use crate::arrays::owned;
+use crate::camera::Camera;
+use crate::errors::{bad_value, detached, pooled};
+use crate::reconstruct::picture;
+use numpy::PyArray2;
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use vg::onnx::{ModelOptions, Provider};
+use vg::scene::Segmenter;
+use vg::scene::mask::Label;
 
 /// A network in an ONNX file, opened by ONNX Runtime, for reconstruct's prior_model and head_model.
 ///
@@ -57,4 +63,25 @@ impl Model {
     fn __repr__(&self) -> String {
         format!("Model({:?})", self.inner.path())
     }
+}
+
+/// The mask of a photograph that has none, by a segmentation network: bool (height, width), True where the vehicle is
+/// that stands at the origin of the camera's vehicle frame.
+///
+/// image: RGB, uint8 (height, width, 3); with a fourth channel, alpha is not looked at.
+/// threads: worker threads; 0 means one per core.
+#[pyfunction]
+#[pyo3(signature = (model, image, camera, threads=0))]
+pub(crate) fn segment<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, Model>,
+    image: &Bound<'py, PyAny>,
+    camera: &Bound<'py, Camera>,
+    threads: usize,
+) -> PyResult<Bound<'py, PyArray2<bool>>> {
+    let (model, camera) = (model.get().inner.clone(), camera.get().inner);
+    let (image, _) = picture(image, "image", &camera)?;
+    let mask = pooled(py, threads, || Segmenter::new(model)?.mask(&image, &camera))?;
+    let is_vehicle = mask.labels().iter().map(|l| *l == Label::Vehicle).collect();
+    Ok(owned(py, (mask.height() as usize, mask.width() as usize), is_vehicle))
 }

@@ -142,7 +142,7 @@ fn scene_of(
             bad_type(&format!("cameras[{i}]"), &found, "a Camera")
         })?;
         let camera = camera.get().inner;
-        let (image, cut_out) = picture(image, i, &camera)?;
+        let (image, cut_out) = picture(image, &format!("images[{i}]"), &camera)?;
         let mask = match masks.map(|list| &list[i]).filter(|o| !o.is_none()) {
             Some(object) => Some(mask(object, i, &camera)?),
             None => cut_out,
@@ -156,30 +156,33 @@ fn scene_of(
 }
 
 /// The picture, and the mask its alpha channel makes if it is transparent somewhere.
-fn picture(object: &Bound<'_, PyAny>, i: usize, camera: &vg::Camera) -> PyResult<(RgbImage, Option<Mask>)> {
+pub(crate) fn picture(
+    object: &Bound<'_, PyAny>,
+    argument: &str,
+    camera: &vg::Camera,
+) -> PyResult<(RgbImage, Option<Mask>)> {
     let py = object.py();
-    let argument = format!("images[{i}]");
     let pixels =
-        array::<u8>(object, &argument, "a NumPy array of uint8, (height, width, 3) or (height, width, 4)")?;
+        array::<u8>(object, argument, "a NumPy array of uint8, (height, width, 3) or (height, width, 4)")?;
     let (width, height) = (camera.width, camera.height);
     let format = match pixels.shape() {
         [h, w, 3] if (*h, *w) == (height as usize, width as usize) => PixelFormat::Rgb8,
         [h, w, 4] if (*h, *w) == (height as usize, width as usize) => PixelFormat::Rgba8,
         other => {
             let allowed = format!("({height}, {width}, 3) or ({height}, {width}, 4), its camera's size");
-            return Err(bad_value(py, &argument, &shape_text(other), &allowed));
+            return Err(bad_value(py, argument, &shape_text(other), &allowed));
         }
     };
     let data = values(&pixels)?;
     let stride = width as usize * format.bytes_per_pixel();
     let library = |e| from_library(py, e);
-    let image = RgbImage::from_strided(&argument, data, width, height, stride, format).map_err(library)?;
+    let image = RgbImage::from_strided(argument, data, width, height, stride, format).map_err(library)?;
     let alpha = || data.iter().skip(3).step_by(4).copied();
     if format == PixelFormat::Rgb8 || alpha().all(|a| a == u8::MAX) {
         return Ok((image, None));
     }
     let alpha: Vec<u8> = alpha().collect();
-    let mask = Mask::from_strided(&argument, &alpha, width, height, width as usize).map_err(library)?;
+    let mask = Mask::from_strided(argument, &alpha, width, height, width as usize).map_err(library)?;
     Ok((image, Some(mask)))
 }
 

@@ -68,6 +68,10 @@ def test_a_path_is_no_model(ellipsoid: Views) -> None:
         capi.reconstruct(*views, prior="onnx", prior_model=path)
     with pytest.raises(TypeError, match="^head_model: str; allowed: a Model"):
         capi.reconstruct(*views, head_model=path)
+    with pytest.raises(TypeError, match="model"):
+        vg.segment(path, ellipsoid.images[0], ellipsoid.cameras[0])
+    with pytest.raises(TypeError, match="^model: str; allowed: a Model"):
+        capi.segment(path, ellipsoid.images[0], ellipsoid.cameras[0])
 
 
 def test_features_are_passed_on_by_the_build_backend() -> None:

@@ -808,7 +808,7 @@ const SIMILARITY: [f64; 16] =
 const POSE: [f64; 12] = [0.0, -1.0, 0.0, 4e5, 1.0, 0.0, 0.0, 5e6, 0.0, 0.0, 1.0, 100.0];
 
 /// A call that works, for each function that can fail.
-pub const CALLS: [fn(&World) -> Call; 33] = [
+pub const CALLS: [fn(&World) -> Call; 35] = [
     context_options_init,
     context_new,
     camera_init,
@@ -838,6 +838,8 @@ pub const CALLS: [fn(&World) -> Call; 33] = [
     image_target_init,
     render,
     render_through_a_lens,
+    segment_options_init,
+    segment,
     scene_options_init,
     colmap_open,
     transforms_open,
@@ -845,7 +847,7 @@ pub const CALLS: [fn(&World) -> Call; 33] = [
 ];
 
 /// `sizeof` in the release that introduced them: no caller has shorter ones.
-pub const FIRST_SIZES: [(&str, usize); 10] = [
+pub const FIRST_SIZES: [(&str, usize); 11] = [
     ("vg_context_options", 16),
     ("vg_camera", 280),
     ("vg_view", 392),
@@ -855,6 +857,7 @@ pub const FIRST_SIZES: [(&str, usize); 10] = [
     ("vg_gaussian_arrays", 64),
     ("vg_render_options", 72),
     ("vg_image_target", 56),
+    ("vg_segment_options", 24),
     ("vg_scene_options", 72),
 ];
 
@@ -886,6 +889,7 @@ init_of!(report_figures_init, vg_report_figures_init, "figures", figures());
 init_of!(gaussian_arrays_init, vg_gaussian_arrays_init, "arrays", arrays(0, [0; 5], 0));
 init_of!(render_options_init, vg_render_options_init, "options", render_options(0));
 init_of!(image_target_init, vg_image_target_init, "target", target(0, 0, 0, 0));
+init_of!(segment_options_init, vg_segment_options_init, "options", segment_options(0));
 init_of!(scene_options_init, vg_scene_options_init, "options", scene_options(0));
 
 fn context_options() -> Lent {
@@ -1308,6 +1312,41 @@ fn render_as(w: &World, function: &'static str, camera: Lent) -> Call {
         .nullable()
         .argument("target", Value::Struct(lent));
     call.targets = vec![color, depth];
+    call
+}
+
+fn segment_options(context: usize) -> Lent {
+    let fields = fields!(vg_segment_options {
+        struct_size: elsewhere(),
+        context: elsewhere(),
+        flags: vec![(0, Fine), (1, Refused), (1 << 63, Refused)],
+    });
+    let mut lent = Lent::zeroed::<vg_segment_options>("vg_segment_options", fields);
+    lent.put("context", 0, context as u64);
+    lent
+}
+
+/// Without a model, which is told last; the picture lies at an odd address.
+pub fn segment(w: &World) -> Call {
+    let mut memory = Vec::new();
+    let view = w.photographs[0].view(0, &mut memory);
+    memory.push(Memory::of(&[view.image], 3));
+    let image = memory.last_mut().expect("a picture").pointer();
+    let stride = WIDTH as usize + 5;
+    let mut mask = blank(HEIGHT, WIDTH as usize, stride, 1, false);
+    let mut call = Call::new("vg_segment", invoke!(vg_segment 0 1 2 3 4 5))
+        .argument("model", Value::Null)
+        .nullable()
+        .argument("image", Value::Handle(image))
+        .argument("camera", Value::Struct(w.camera()))
+        .argument("options", Value::Struct(segment_options(w.context)))
+        .nullable()
+        .argument("out_mask", Value::Handle(mask.memory.pointer()))
+        .argument("row_stride", Value::Number(stride as u64))
+        .tries(counts(&[1, 47, usize::MAX as u64, usize::MAX as u64 / 2]))
+        .memory(memory);
+    call.targets = vec![mask];
+    call.good = if vg::onnx::is_built() { vg_status::Argument } else { vg_status::NotBuilt };
     call
 }
 

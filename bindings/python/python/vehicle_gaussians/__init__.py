@@ -20,6 +20,7 @@ from ._native import (
     pose_from_box,
     pose_from_colmap,
     pose_from_opengl,
+    segment,
     similarity_from_points,
 )
 from ._reconstruct import Points, Reconstruction, reconstruct
@@ -40,5 +41,6 @@ __all__ = [
     "pose_from_colmap",
     "pose_from_opengl",
     "reconstruct",
+    "segment",
     "similarity_from_points",
 ]

@@ -17,6 +17,7 @@ __all__ = [
     "pose_from_colmap",
     "pose_from_opengl",
     "reconstruct",
+    "segment",
     "similarity_from_points",
 ]
 
@@ -182,6 +183,12 @@ def pose_from_opengl(
 ) -> npt.NDArray[np.float64]: ...
 def pose_from_box(ego_from_vehicle: npt.ArrayLike, ego_from_camera: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
 def similarity_from_points(source: npt.ArrayLike, target: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
+def segment(
+    model: Model,
+    image: npt.NDArray[np.uint8],
+    camera: Camera,
+    threads: int = 0,
+) -> npt.NDArray[np.bool_]: ...
 def reconstruct(
     images: Sequence[object],
     masks: Sequence[object] | None,

@@ -293,6 +293,10 @@ class vg_image_target(ct.Structure):
     )
 
 
+class vg_segment_options(ct.Structure):
+    _fields_ = (("struct_size", ct.c_size_t), ("context", ct.c_void_p), ("flags", ct.c_uint64))
+
+
 class vg_scene_options(ct.Structure):
     _fields_ = (
         ("struct_size", ct.c_size_t),
@@ -377,6 +381,11 @@ PROTOTYPES: Mapping[str, tuple[Any, tuple[Any, ...]]] = {
     "vg_render": (
         _i32,
         (_handle, _pointer(vg_camera), _pointer(vg_render_options), _pointer(vg_image_target), _out),
+    ),
+    "vg_segment_options_init": (_i32, (_pointer(vg_segment_options), _size)),
+    "vg_segment": (
+        _i32,
+        (_handle, _pointer(vg_image), _pointer(vg_camera), _pointer(vg_segment_options), _numbers, _size, _out),
     ),
     "vg_scene_options_init": (_i32, (_pointer(vg_scene_options), _size)),
     "vg_colmap_open": (_i32, (_text, _pointer(vg_scene_options), _out, _out)),
@@ -1012,6 +1021,22 @@ def _lent(array: npt.NDArray[Any], format: Format, alive: list[Any]) -> vg_image
         array = np.ascontiguousarray(array)
     alive.append(array)
     return vg_image(array.ctypes.data, array.strides[0], width, height, format, 0)
+
+
+def segment(
+    model: Model, image: npt.NDArray[np.uint8], camera: Camera, *, context: Context | None = None
+) -> npt.NDArray[np.uint8]:
+    """The mask of a photograph that has none, by a segmentation network: uint8 (height, width), 255 is the vehicle.
+
+    The image is RGB or RGBA and read where it is; alpha is not looked at.
+    """
+    _lent_model(model, "model")
+    alive: list[Any] = []
+    picture, posed, options = _photograph(image, "image", alive), _camera(camera), _initial(vg_segment_options)
+    options.context = None if context is None else context._as_parameter_
+    mask = np.empty((picture.height, picture.width), np.uint8)
+    _call("vg_segment", model, ct.byref(picture), ct.byref(posed), ct.byref(options), mask.ctypes.data, 0)
+    return mask
 
 
 class Scene(NamedTuple):

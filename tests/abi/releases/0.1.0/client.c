@@ -187,8 +187,10 @@ static void colmap_without_a_folder(void) {
 }
 
 /* In a build without networks that is the answer; with them, and no such file, another. */
-static void models_without_a_file(const vg_view *views, size_t count) {
+static void models_without_a_file(const vg_view *views, size_t count, vg_context *context) {
+    static uint8_t mask[64 * 48];
     vg_model_options settings;
+    vg_segment_options segment;
     vg_options options;
     vg_model *model = (vg_model *)&settings;
     vg_gaussians *car = NULL;
@@ -213,6 +215,15 @@ static void models_without_a_file(const vg_view *views, size_t count) {
     FAILS(vg_reconstruct(views, count, &options, &car, NULL, &error),
           built == VG_STATUS_IO ? VG_STATUS_ARGUMENT : VG_STATUS_NOT_BUILT, "options.prior");
     CHECK(car == NULL);
+
+    CHECK(vg_segment_options_init(&segment, sizeof segment) == VG_STATUS_OK && segment.context == NULL);
+    segment.context = context;
+    FAILS(vg_segment(NULL, &views[0].image, &views[0].camera, &segment, mask, 7, &error), VG_STATUS_ARGUMENT,
+          "row_stride: 7 bytes");
+    FAILS(vg_segment(NULL, &views[0].image, &views[0].camera, &segment, NULL, 0, &error), VG_STATUS_ARGUMENT, "out_mask");
+    FAILS(vg_segment(NULL, &views[0].image, &views[0].camera, NULL, mask, 0, &error),
+          built == VG_STATUS_IO ? VG_STATUS_ARGUMENT : VG_STATUS_NOT_BUILT, "model");
+    CHECK(mask[0] == 0);
 }
 
 static vg_gaussians *reconstruct(vg_context *context, const vg_view *views, size_t count) {
@@ -450,7 +461,7 @@ int main(int argc, char **argv) {
     }
     FAILS(vg_scene_get_view(scene, 4, &views[0], &error), VG_STATUS_ARGUMENT, "index");
 
-    models_without_a_file(views, 4);
+    models_without_a_file(views, 4, context);
     car = reconstruct(context, views, 4);
     n = vg_gaussians_count(car);
     print_hash("positions", vg_gaussians_positions(car), n * 3 * sizeof(float));
