@@ -5,7 +5,7 @@
 //! sum of T alpha z, divided by the resampled alpha in the end: these sums are linear, so an interpolated pixel is
 //! what blending between its neighbours would have drawn, and empty neighbours do not pull its depth towards 0.
 
-use super::{Background, DepthMode, RenderOptions, Rendered, Renderer};
+use super::{Background, DepthMode, PictureGradient, RenderOptions, Rendered, Renderer};
 use crate::error::Result;
 use crate::gaussians::Gaussians;
 use crate::geometry::Camera;
@@ -64,6 +64,14 @@ impl LensMap {
         camera: &Camera,
         options: &RenderOptions,
     ) -> Result<Rendered> {
+        let (pinhole, fine) = self.pinhole(camera, options);
+        let mut out = Rendered::default();
+        self.resample(&renderer.render(gaussians, &pinhole, &fine)?, options, &mut out);
+        Ok(out)
+    }
+
+    /// The camera and options of the pinhole picture that is resampled.
+    pub(super) fn pinhole(&self, camera: &Camera, options: &RenderOptions) -> (Camera, RenderOptions) {
         let pinhole = Camera { vehicle_from_camera: camera.vehicle_from_camera, ..self.pinhole };
         // Focal lengths in pixels grew by this; a blur given in pixels^2 grows by its square.
         let scale = pinhole.intrinsics.fx / camera.intrinsics.fx;
@@ -73,18 +81,19 @@ impl LensMap {
             blur: ((f64::from(options.blur) * scale * scale) as f32).min(MAX_BLUR),
             ..*options
         };
-        let picture = renderer.render(gaussians, &pinhole, &fine)?;
-        let pixels = camera.width as usize * camera.height as usize;
-        let mut out = Rendered {
-            width: camera.width,
-            height: camera.height,
-            color: vec![[0.0; 3]; pixels],
-            alpha: vec![0.0; pixels],
-            depth: vec![0.0; pixels],
-        };
+        (pinhole, fine)
+    }
+
+    /// The lens's picture of the pinhole picture `fine`.
+    pub(super) fn resample(&self, fine: &Rendered, options: &RenderOptions, out: &mut Rendered) {
+        let pixels = self.positions.len();
+        (out.width, out.height) = (self.source.width, self.source.height);
+        out.color.resize(pixels, [0.0; 3]);
+        out.alpha.resize(pixels, 0.0);
+        out.depth.resize(pixels, 0.0);
         let planes = out.color.par_iter_mut().zip(&mut out.alpha).zip(&mut out.depth);
         planes.zip(&self.positions).with_min_len(1 << 12).for_each(|(((color, alpha), depth), position)| {
-            let ([r, g, b], a, d) = sample(&picture, *position);
+            let ([r, g, b], a, d) = sample(fine, *position);
             let behind = match options.background {
                 Background::Color(rgb) => rgb.map(|v| v * (1.0 - a)),
                 Background::Transparent => [0.0; 3],
@@ -97,7 +106,56 @@ impl LensMap {
                 DepthMode::Accumulated => d,
             };
         });
-        Ok(out)
+    }
+
+    /// The adjoint of [`LensMap::resample`]: the gradient of the lens's picture scattered with the weights it was
+    /// read with. `picture` is the lens's. Returns the gradient of the background.
+    ///
+    /// One thread, in the order of the lens's pixels.
+    pub(super) fn scatter(
+        &self,
+        picture: &Rendered,
+        options: &RenderOptions,
+        gradient: &PictureGradient,
+        fine: &mut PictureGradient,
+    ) -> [f64; 3] {
+        let (width, height) = (fine.width, fine.height);
+        fine.add_planes();
+        let PictureGradient { color: color_plane, alpha: alpha_plane, depth: depth_plane, .. } = fine;
+        let mut background = [0.0; 3];
+        let behind = match options.background {
+            Background::Color(rgb) => Some(rgb),
+            Background::Transparent => None,
+        };
+        for (i, position) in self.positions.iter().enumerate() {
+            let a = picture.alpha[i];
+            let color = gradient.color.get(i).copied().unwrap_or([0.0; 3]);
+            let mut alpha = gradient.alpha.get(i).copied().unwrap_or(0.0);
+            let mut depth = gradient.depth.get(i).copied().unwrap_or(0.0);
+            if let Some(behind) = behind {
+                for c in 0..3 {
+                    alpha -= color[c] * behind[c];
+                    background[c] += f64::from(color[c]) * f64::from(1.0 - a);
+                }
+            }
+            if options.depth_mode == DepthMode::Expected {
+                // d(D/A) = (dD - D/A dA) / A.
+                depth = if a > 0.0 { depth / a } else { 0.0 };
+                alpha -= depth * picture.depth[i];
+            }
+            if position[0].is_nan() {
+                continue;
+            }
+            let taps = Taps::new(*position, width, height);
+            for (at, weight) in taps.index.into_iter().zip(taps.weights()) {
+                for c in 0..3 {
+                    color_plane[at][c] += weight * color[c];
+                }
+                alpha_plane[at] += weight * alpha;
+                depth_plane[at] += weight * depth;
+            }
+        }
+        background
     }
 }
 

@@ -2,11 +2,13 @@
 
 pub mod cpu;
 pub mod distorted;
+pub mod gradient;
 pub mod options;
 pub mod output;
 pub mod reference;
 
 pub use cpu::CpuRenderer;
+pub use gradient::{Differentiable, Gradients, PictureGradient, PoseGradient};
 pub use options::{Background, DepthMode, RenderOptions};
 pub use output::Rendered;
 pub use reference::Reference;

@@ -15,6 +15,33 @@ use pulp::f32x8;
 /// Splats fetched at a time: their cache misses overlap here, which they cannot while one is being blended.
 const BATCH: usize = 32;
 
+/// Told of everything that is drawn, in order; the picture alone needs none of it.
+pub(super) trait Record {
+    /// Eight rows of a splat follow: at most 64 blocks.
+    fn rows(&mut self);
+
+    /// Block `block` of the tile had transmittance `t` (negative: finished) before `alpha` was drawn on it, which
+    /// is 0 in lanes that drew nothing.
+    fn block<S: Lanes>(&mut self, simd: S, block: usize, alpha: f32x8, t: f32x8);
+
+    /// Splat number `splat` has been drawn.
+    fn splat(&mut self, splat: usize);
+}
+
+/// Nothing is remembered.
+pub(super) struct Forget;
+
+impl Record for Forget {
+    #[inline(always)]
+    fn rows(&mut self) {}
+
+    #[inline(always)]
+    fn block<S: Lanes>(&mut self, _: S, _: usize, _: f32x8, _: f32x8) {}
+
+    #[inline(always)]
+    fn splat(&mut self, _: usize) {}
+}
+
 /// Blends the splats that `list` names, nearest first, into the tile whose first pixel is `origin`.
 #[inline(always)]
 pub(super) fn blend<S: Lanes>(
@@ -24,11 +51,9 @@ pub(super) fn blend<S: Lanes>(
     list: &[Entry],
     splats: &[Splat],
     max_alpha: f32,
+    record: &mut impl Record,
 ) {
-    let mut x = [pixel_centers(origin[0]); BLOCKS];
-    for (at, x) in x.iter_mut().enumerate() {
-        *x = pixel_centers(origin[0] + at * BLOCK);
-    }
+    let x = block_centers(origin[0]);
     let mut entries = [Entry::default(); BATCH];
     let mut batch = [Splat::default(); BATCH];
     for list in list.chunks(BATCH) {
@@ -45,7 +70,8 @@ pub(super) fn blend<S: Lanes>(
             *slot = splats[entry.splat()];
         }
         for (entry, splat) in entries[..count].iter().zip(&batch) {
-            blend_splat(simd, tile, origin, &x, *entry, splat, max_alpha);
+            blend_splat(simd, tile, origin, &x, *entry, splat, max_alpha, record);
+            record.splat(entry.splat());
         }
     }
 }
@@ -96,6 +122,7 @@ fn blend_splat<S: Lanes>(
     entry: Entry,
     splat: &Splat,
     max_alpha: f32,
+    record: &mut impl Record,
 ) {
     let [first_row, last_row] = entry.rows();
     let footprint = Footprint::new(simd, splat);
@@ -107,6 +134,7 @@ fn blend_splat<S: Lanes>(
     // The same blocks in each of eight rows.
     let columns = u64::from(entry.blocks()) * 0x0101_0101_0101_0101;
     for row in (first_row..=last_row).step_by(BLOCK) {
+        record.rows();
         let rows = footprint.rows(simd, left, top + row);
         let mut live = [0; BLOCK];
         live.copy_from_slice(&tile.live[row..row + BLOCK]);
@@ -122,7 +150,9 @@ fn blend_splat<S: Lanes>(
             let alpha = simd.mul_f32s(opacity, simd::exp2(simd, exponent));
             let alpha = simd.min_f32s(alpha, max_alpha);
             let block = &mut tile.blocks[row * BLOCKS + i];
-            composite(simd, block, alpha, color, depth);
+            let t = block.transmittance;
+            let drawn = composite(simd, block, alpha, color, depth);
+            record.block(simd, row * BLOCKS + i, drawn, t);
             if simd.sign_bits(block.transmittance) == 0xff {
                 tile.live[row + r] &= !(1 << at);
             }
@@ -130,7 +160,18 @@ fn blend_splat<S: Lanes>(
     }
 }
 
+/// x of the pixel centres of each block of a tile that begins at column `left`.
+#[inline(always)]
+pub(super) fn block_centers(left: usize) -> [f32x8; BLOCKS] {
+    let mut x = [pixel_centers(left); BLOCKS];
+    for (at, x) in x.iter_mut().enumerate() {
+        *x = pixel_centers(left + at * BLOCK);
+    }
+    x
+}
+
 /// x of the centres of eight pixels.
+#[inline(always)]
 fn pixel_centers(left: usize) -> f32x8 {
     let x = left as f32 + 0.5;
     f32x8(x, x + 1.0, x + 2.0, x + 3.0, x + 4.0, x + 5.0, x + 6.0, x + 7.0)
@@ -219,8 +260,9 @@ fn block_of<S: Lanes>(simd: S, x: f32x8) -> pulp::u32x8 {
 }
 
 /// C += T alpha colour, D += T alpha z, T *= 1 - alpha where alpha counts and the pixel is not finished by it.
+/// Returns alpha where it was drawn, else 0.
 #[inline(always)]
-fn composite<S: Lanes>(simd: S, block: &mut Block, alpha: f32x8, color: [f32x8; 3], depth: f32x8) {
+fn composite<S: Lanes>(simd: S, block: &mut Block, alpha: f32x8, color: [f32x8; 3], depth: f32x8) -> f32x8 {
     let t = block.transmittance;
     let next = simd.mul_f32s(t, simd.sub_f32s(simd.splat_f32s(1.0), alpha));
     // False for a NaN, which a form that has overflowed may give.
@@ -236,4 +278,5 @@ fn composite<S: Lanes>(simd: S, block: &mut Block, alpha: f32x8, color: [f32x8; 
     block.depth = simd.mul_add(weight, depth, block.depth);
     let closed = simd.select_f32s(counts, simd.or_f32s(t, simd.splat_f32s(-0.0)), t);
     block.transmittance = simd.select_f32s(drawn, next, closed);
+    simd.select_f32s(drawn, alpha, simd.splat_f32s(0.0))
 }
