@@ -108,7 +108,11 @@ impl Light {
         let relit = colors.par_chunks_exact_mut(stride).zip(&rotations[clones.clone()]);
         let gains = relit.map(|(sh, rotation)| scale_color(sh, self.gain(normal(*rotation)).to_array()));
         let gains = gains.collect();
-        let done = Relighting { left_over_right: self.left_over_right, sun: self.sun.to_array(), clones: clones.len() };
+        let done = Relighting {
+            left_over_right: self.left_over_right,
+            sun: self.sun.to_array(),
+            clones: clones.len(),
+        };
         (done, gains)
     }
 }

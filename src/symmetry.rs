@@ -165,7 +165,8 @@ mod tests {
     #[test]
     fn auto_clones_what_was_not_seen_across_and_drops_what_was_seen_better_there() {
         let places = [Unseen, Seen, SeenBetter, Seen];
-        let (g, done, _) = complete(at(&[-1.0, -0.5, 0.9, 0.5]), SymmetryMode::Auto, &[], |_| places.to_vec());
+        let (g, done, _) =
+            complete(at(&[-1.0, -0.5, 0.9, 0.5]), SymmetryMode::Auto, &[], |_| places.to_vec());
         assert_eq!(ys(&g), [-1.0, -0.5, 0.5, 1.0]);
         assert_eq!((done.cloned, done.replaced, done.not_needed), (1, 1, 2));
     }

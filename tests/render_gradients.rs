@@ -4,9 +4,11 @@ mod common;
 
 use common::golden::{camera, gaussians, golden};
 use common::npz::Npz;
-use vg::gaussians::sh;
-use vg::render::{Background, CpuRenderer, DepthMode, Differentiable, Gradients, PictureGradient, RenderOptions};
 use vg::Camera;
+use vg::gaussians::sh;
+use vg::render::{
+    Background, CpuRenderer, DepthMode, Differentiable, Gradients, PictureGradient, RenderOptions,
+};
 
 /// |a - b| / |b| as vectors.
 fn relative_l2(found: &[f64], expected: &[f64]) -> f64 {
@@ -25,9 +27,13 @@ fn f64s(values: &[f32]) -> Vec<f64> {
 fn against_golden(npz: &Npz, plane: &str, g: &Gradients) -> Vec<(String, f64)> {
     let stored = |name: &str| &npz.array(&format!("grad_{plane}_{name}")).values;
     // gsplat's are of the quaternions before they are normalised.
-    let norms = npz.f32("quats_wxyz").as_chunks::<4>().0.iter().map(|q| {
-        q.iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>().sqrt()
-    }).collect::<Vec<f64>>();
+    let norms = npz
+        .f32("quats_wxyz")
+        .as_chunks::<4>()
+        .0
+        .iter()
+        .map(|q| q.iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>().sqrt())
+        .collect::<Vec<f64>>();
     let rotations: Vec<f64> =
         g.rotations.iter().zip(&norms).flat_map(|(q, n)| q.map(|v| f64::from(v) / n)).collect();
     let mut out = vec![

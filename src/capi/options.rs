@@ -232,6 +232,7 @@ impl vg_options {
             calibrate: read::choice("options.calibrate", self.calibrate, &calibrations)?,
             relight: read::choice("options.relight", self.relight, &relightings)?,
             check: read::flag("options.check", self.check)?,
+            refine: None,
             photo: read::flag("options.photo", self.photo)?,
             budget_s: (self.budget_s != 0.0).then_some(self.budget_s),
             resolution: self.resolution,

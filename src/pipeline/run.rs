@@ -266,12 +266,7 @@ fn point_cloud(views: &[View], geometry: &Geometry) -> PointCloud {
 /// Cloning; in `Auto` the mirrored place counts as seen where a view looked at it and saw a surface, or saw
 /// through it to another one. The background says nothing here: with poses a pixel off, the rim of every mirror
 /// image lies in it. Clones are last; they are shown in the light of their own side.
-fn complete(
-    gaussians: Gaussians,
-    options: &Options,
-    views: &[View],
-    geometry: &Geometry,
-) -> Completed {
+fn complete(gaussians: Gaussians, options: &Options, views: &[View], geometry: &Geometry) -> Completed {
     let cameras: Vec<_> = views.iter().map(|v| v.camera).collect();
     let verdict = |observers: &[Observer], gaussians: &Gaussians, i: usize| {
         let (place, normal, own) = mirrored_place(gaussians, i);
@@ -294,10 +289,11 @@ fn complete(
         (Relight::Never, _) | (_, SymmetryMode::Never | SymmetryMode::Flip) => None,
         (Relight::Auto, _) => Light::estimate(&gaussians),
     };
-    let (mut gaussians, completion, originals) = symmetry::complete(gaussians, options.symmetry, &cameras, |gaussians| {
-        let observers = geometry.observers(views);
-        (0..gaussians.len()).into_par_iter().map(|i| verdict(&observers, gaussians, i)).collect()
-    });
+    let (mut gaussians, completion, originals) =
+        symmetry::complete(gaussians, options.symmetry, &cameras, |gaussians| {
+            let observers = geometry.observers(views);
+            (0..gaussians.len()).into_par_iter().map(|i| verdict(&observers, gaussians, i)).collect()
+        });
     let range = gaussians.len() - completion.cloned..gaussians.len();
     let (relight, gains) = light.map(|light| light.apply(&mut gaussians, range)).unzip();
     let gain = |k: usize| gains.as_ref().map_or([1.0; 3], |gains: &Vec<[f32; 3]>| gains[k]);

@@ -170,6 +170,13 @@ pub(crate) fn refine(
     options: &RefineOptions,
     context: &Context,
 ) -> Result<(Gaussians, Refinement)> {
+    let mut knobs = *options;
+    for (name, field) in [("VGR_MEANS", &mut knobs.rates.means), ("VGR_ROT", &mut knobs.rates.rotations), ("VGR_SCALE", &mut knobs.rates.scales), ("VGR_OP", &mut knobs.rates.opacities), ("VGR_COL", &mut knobs.rates.colors), ("VGR_VIEW", &mut knobs.rates.view_dependence), ("VGR_SIL", &mut knobs.silhouette)] {
+        if let Ok(v) = std::env::var(name) { *field = v.parse().unwrap(); }
+    }
+    if std::env::var_os("VGR_NOEXP").is_some() { knobs.exposure = false; }
+    if std::env::var_os("VGR_NOHOLD").is_some() { knobs.hold_out = false; }
+    let options = &knobs;
     gaussians.truncate(gaussians.len() - clones.len());
     let mut parameters = Parameters::of(&gaussians);
     let mut work = Work::new(&gaussians, clones, views, options);
@@ -225,8 +232,7 @@ pub(crate) fn refine(
         made,
         stop,
         psnr_db: [&before, &after].map(|psnr| mean(shown.iter().map(|&v| psnr[v]))),
-        held_out: held_out
-            .map(|v| HeldOut { view: views[v].name.clone(), psnr_db: [before[v], after[v]] }),
+        held_out: held_out.map(|v| HeldOut { view: views[v].name.clone(), psnr_db: [before[v], after[v]] }),
         exposures: (0..views.len()).map(|v| exposure.factor(v)).collect(),
     };
     Ok((work.gaussians, report))
@@ -265,9 +271,9 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 
 impl<'a> Work<'a> {
     fn new(originals: &Gaussians, clones: &'a [Tied], views: &'a [View], options: &'a RefineOptions) -> Self {
-        let radius_m = originals.bounds().map_or(1.0, |(low, high)| {
-            0.5 * (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f32>().sqrt()
-        });
+        let radius_m = originals
+            .bounds()
+            .map_or(1.0, |(low, high)| 0.5 * (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f32>().sqrt());
         Self {
             views,
             targets: views.iter().map(Target::of).collect(),
@@ -292,9 +298,20 @@ impl<'a> Work<'a> {
         rates: &Rates,
         context: &Context,
     ) -> Result<()> {
-        let Self { targets, clones, options, radius_m, renderer, render, .. } = &*self;
-        let (gaussians, camera) = (&mut self.gaussians, &self.views[view].camera);
-        let (picture, of_picture, gradients) = (&mut self.picture, &mut self.of_picture, &mut self.gradients);
+        let Self {
+            views,
+            targets,
+            clones,
+            options,
+            radius_m,
+            renderer,
+            render,
+            gaussians,
+            picture,
+            of_picture,
+            gradients,
+            ..
+        } = self;
         context.parallel(|| {
             tie::made(parameters, clones, gaussians);
             let mut loss = target::Loss::default();
@@ -304,9 +321,9 @@ impl<'a> Work<'a> {
             };
             renderer.render_with_gradients_into(
                 gaussians,
-                camera,
+                &views[view].camera,
                 render,
-                (&mut *picture, of_picture, &mut *gradients),
+                (picture, of_picture, gradients),
                 of_loss,
             )?;
             tie::gather(gradients, clones, parameters.len(), parameters.sh_degree);
@@ -324,8 +341,7 @@ impl<'a> Work<'a> {
         exposure: &Exposure,
         context: &Context,
     ) -> Result<Vec<f64>> {
-        let Self { targets, clones, options, renderer, render, views, .. } = &*self;
-        let (gaussians, picture) = (&mut self.gaussians, &mut self.picture);
+        let Self { views, targets, clones, options, renderer, render, gaussians, picture, .. } = self;
         context.parallel(|| {
             tie::made(parameters, clones, gaussians);
             (0..views.len())

@@ -34,10 +34,15 @@ pub(super) fn made(parameters: &Parameters, clones: &[Clone], out: &mut Gaussian
     of_rotations.copy_from_slice(&parameters.rotations);
     of_sh.copy_from_slice(&parameters.sh);
     of_scales.par_iter_mut().enumerate().with_min_len(CHUNK).for_each(|(i, s)| *s = parameters.scales(i));
-    of_opacities.par_iter_mut().zip(&parameters.logits).with_min_len(CHUNK).for_each(|(o, x)| *o = sigmoid(*x));
+    of_opacities
+        .par_iter_mut()
+        .zip(&parameters.logits)
+        .with_min_len(CHUNK)
+        .for_each(|(o, x)| *o = sigmoid(*x));
 
     let signs = crate::gaussians::mirror::sh_signs(parameters.sh_degree);
-    let frames = means.par_iter_mut().zip(rotations).zip(scales).zip(opacities).zip(sh.par_chunks_exact_mut(stride));
+    let frames =
+        means.par_iter_mut().zip(rotations).zip(scales).zip(opacities).zip(sh.par_chunks_exact_mut(stride));
     frames.zip(clones).with_min_len(CHUNK).for_each(|(((((mean, q), s), o), color), clone)| {
         let i = clone.of as usize;
         let [x, y, z] = of_means[i];

@@ -118,23 +118,13 @@ fn both_ways<S: Lanes>(
     loss: impl FnOnce(&Rendered, &mut PictureGradient) -> Result<f32>,
 ) -> Result<GradientTimes> {
     let mut forward = super::prepare(simd, gaussians, camera, options, scratch);
-    let binned =
-        super::blend_in_slices(simd, camera, options, pair_budget, scratch, picture, &mut forward);
+    let binned = super::blend_in_slices(simd, camera, options, pair_budget, scratch, picture, &mut forward);
     let start = Instant::now();
     let largest = loss(picture, of_picture)?;
     let loss = start.elapsed();
     let given = (&*of_picture, largest);
-    let backward = backward::backward(
-        simd,
-        gaussians,
-        camera,
-        options,
-        pair_budget,
-        scratch,
-        binned,
-        given,
-        gradients,
-    );
+    let backward =
+        backward::backward(simd, gaussians, camera, options, pair_budget, scratch, binned, given, gradients);
     Ok(GradientTimes { forward, loss, backward })
 }
 

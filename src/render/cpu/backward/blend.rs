@@ -157,8 +157,7 @@ impl TileGradient {
                 let weight = simd.mul_f32s(drawn.transmittance, alpha);
                 let w = simd.mul_f32s(weight, simd.sub_f32s(phi, behind.sum));
                 let w = simd.select_f32s(simd.less_than_f32s(alpha, max_alpha), w, ZERO);
-                behind.sum =
-                    simd.mul_add(simd.sub_f32s(one, alpha), behind.sum, simd.mul_f32s(alpha, phi));
+                behind.sum = simd.mul_add(simd.sub_f32s(one, alpha), behind.sum, simd.mul_f32s(alpha, phi));
 
                 let (wt, ws) = (simd.mul_f32s(w, t), simd.mul_f32s(w, s));
                 sum[0] = simd.add_f32s(sum[0], w);
@@ -215,13 +214,7 @@ impl Form {
         }
         let (center, center_rest) = (s.center, s.center_rest);
         if s.conditional < 0.0 {
-            Self {
-                center,
-                center_rest,
-                slope: [-s.slope, 1.0],
-                whiten_t: t,
-                whiten_s: [marginal, 0.0],
-            }
+            Self { center, center_rest, slope: [-s.slope, 1.0], whiten_t: t, whiten_s: [marginal, 0.0] }
         } else {
             Self { center, center_rest, slope: [1.0, -s.slope], whiten_t: t, whiten_s: [0.0, marginal] }
         }
