@@ -25,8 +25,8 @@
  *            vg_image and a Span own nothing: they point into a Scene, a cv::Mat or Gaussians, which must
  *            outlive them.
  *
- * Options.   Options, ModelOptions, SegmentOptions, RenderOptions, SceneOptions are the structs of vg.h with their default values set.
- *            Their fields are explained there.
+ * Options.   Options, ModelOptions, SegmentOptions, RenderOptions, SceneOptions are the structs of vg.h with
+ *            their default values set. Their fields are explained there.
  *
  * Callbacks. on_progress and on_log take any callable. They come on the calling thread, one at a time. An
  *            exception that leaves one ends the program (std::terminate), because it cannot pass through the

@@ -188,7 +188,7 @@ static void colmap_without_a_folder(void) {
 
 /* In a build without networks that is the answer; with them, and no such file, another. */
 static void models_without_a_file(const vg_view *views, size_t count, vg_context *context) {
-    static uint8_t mask[64 * 48];
+    static uint8_t mask[1]; /* nothing is written without a model */
     vg_model_options settings;
     vg_segment_options segment;
     vg_options options;
@@ -203,7 +203,8 @@ static void models_without_a_file(const vg_view *views, size_t count, vg_context
     settings.threads = 2;
     built = vg_model_open("/nowhere/at/all.onnx", &settings, &model, NULL);
     CHECK(model == NULL && (built == VG_STATUS_NOT_BUILT || built == VG_STATUS_IO));
-    FAILS(vg_model_open("/nowhere/at/all.onnx", NULL, &model, &error), built, built == VG_STATUS_IO ? "all.onnx" : "onnx");
+    FAILS(vg_model_open("/nowhere/at/all.onnx", NULL, &model, &error), built,
+          built == VG_STATUS_IO ? "all.onnx" : "feature onnx");
     settings.provider = 9;
     FAILS(vg_model_open("x.onnx", &settings, &model, &error), VG_STATUS_ARGUMENT, "options.provider: 9");
     FAILS(vg_model_open(NULL, NULL, &model, &error), VG_STATUS_ARGUMENT, "path: NULL");
@@ -220,7 +221,8 @@ static void models_without_a_file(const vg_view *views, size_t count, vg_context
     segment.context = context;
     FAILS(vg_segment(NULL, &views[0].image, &views[0].camera, &segment, mask, 7, &error), VG_STATUS_ARGUMENT,
           "row_stride: 7 bytes");
-    FAILS(vg_segment(NULL, &views[0].image, &views[0].camera, &segment, NULL, 0, &error), VG_STATUS_ARGUMENT, "out_mask");
+    FAILS(vg_segment(NULL, &views[0].image, &views[0].camera, &segment, NULL, 0, &error), VG_STATUS_ARGUMENT,
+          "out_mask");
     FAILS(vg_segment(NULL, &views[0].image, &views[0].camera, NULL, mask, 0, &error),
           built == VG_STATUS_IO ? VG_STATUS_ARGUMENT : VG_STATUS_NOT_BUILT, "model");
     CHECK(mask[0] == 0);
