@@ -49,28 +49,6 @@ impl Adam {
             }
         });
     }
-
-    /// What is kept of it, in order; `width` numbers each.
-    pub(super) fn retain(&mut self, keep: &[bool], width: usize) {
-        for state in [&mut self.first, &mut self.second] {
-            let mut rows = state.chunks_exact(width).zip(keep);
-            let mut kept = Vec::with_capacity(state.len());
-            rows.by_ref().filter(|(_, keep)| **keep).for_each(|(row, _)| kept.extend_from_slice(row));
-            *state = kept;
-        }
-    }
-
-    /// New parameters at the end, without a past.
-    pub(super) fn extend(&mut self, len: usize) {
-        self.first.resize(len, 0.0);
-        self.second.resize(len, 0.0);
-    }
-
-    /// Forgets the past of all.
-    pub(super) fn forget(&mut self) {
-        self.first.fill(0.0);
-        self.second.fill(0.0);
-    }
 }
 
 #[cfg(test)]

@@ -7,103 +7,26 @@
 
 mod adam;
 mod exposure;
+mod options;
 mod parameters;
 mod target;
 pub(crate) mod tie;
+mod work;
 
+pub use options::{Amount, RefineOptions};
 pub use parameters::Rates;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gaussians::Gaussians;
 use crate::progress::Context;
-use crate::render::{Background, CpuRenderer, Gradients, PictureGradient, RenderOptions, Rendered};
 use crate::scene::View;
 use exposure::Exposure;
-use parameters::{Optimizer, Parameters};
+use parameters::Parameters;
 use serde::Serialize;
+use std::collections::VecDeque;
 use std::time::Instant;
-use target::Target;
 use tie::Clone as Tied;
-
-/// How long to refine.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Amount {
-    /// So many steps.
-    Iterations(u32),
-    /// About so many seconds: a number of steps that is found by timing the first ones. The report tells it, and the
-    /// same number gives the same bytes.
-    Seconds(f64),
-}
-
-/// Settings of a refinement; `RefineOptions::default()` is what everything is measured with.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct RefineOptions {
-    /// How long.
-    pub amount: Amount,
-    /// Step sizes.
-    pub rates: Rates,
-    /// Weight of 1 - SSIM beside that of the mean absolute difference of colours, which is the rest to 1.
-    pub ssim: f32,
-    /// Weight of the mean absolute difference of alpha and mask.
-    pub silhouette: f32,
-    /// Whether each view has an exposure of its own.
-    pub exposure: bool,
-    /// Whether one of three or more views takes no part and tells when to stop.
-    pub hold_out: bool,
-}
-
-impl Default for RefineOptions {
-    fn default() -> Self {
-        Self {
-            amount: Amount::Iterations(300),
-            rates: Rates {
-                means: 1.6e-4,
-                rotations: 1e-3,
-                scales: 5e-3,
-                opacities: 2.5e-2,
-                colors: 2.5e-3,
-                view_dependence: 1.25e-4,
-            },
-            ssim: 0.2,
-            silhouette: 0.1,
-            exposure: true,
-            hold_out: true,
-        }
-    }
-}
-
-impl RefineOptions {
-    /// Each field in its range.
-    pub fn validate(&self) -> Result<()> {
-        let refuse = |field: &str, found: String, allowed: &str| {
-            Err(Error::argument(format!("options.refine.{field}"), found, allowed))
-        };
-        match self.amount {
-            Amount::Iterations(n) if n > MOST_ITERATIONS => {
-                return refuse("iterations", n.to_string(), "at most 1000000");
-            }
-            Amount::Seconds(s) if !(s > 0.0 && s <= 86400.0) => {
-                return refuse("seconds", s.to_string(), "above 0, at most 86400");
-            }
-            _ => {}
-        }
-        for (name, weight) in [("ssim", self.ssim), ("silhouette", self.silhouette)] {
-            if !(0.0..=1.0).contains(&weight) {
-                return refuse(name, weight.to_string(), "0 to 1");
-            }
-        }
-        for (name, rate) in self.rates.named() {
-            if !(0.0..=10.0).contains(&rate) {
-                return refuse(&format!("rates.{name}"), rate.to_string(), "0 to 10");
-            }
-        }
-        Ok(())
-    }
-}
-
-/// More steps are a mistake: 3DGS takes 30,000.
-const MOST_ITERATIONS: u32 = 1_000_000;
+use work::Work;
 
 /// Why a refinement ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -122,15 +45,17 @@ pub enum Stop {
 pub struct Refinement {
     /// Steps that were planned: with `Amount::Iterations` of this number another call does the same.
     pub iterations: u32,
-    /// Steps that the result has seen; 0 if nothing was better than the beginning.
-    pub kept: u32,
     /// Steps that were made.
     pub made: u32,
+    /// Steps that the result has seen; 0 if nothing was better than the beginning.
+    pub kept: u32,
     /// Why it ended.
     pub stop: Stop,
-    /// Mean PSNR of the views that took part, before and after, dB.
+    /// Mean loss of the first and of the last round over the views.
+    pub loss: [f64; 2],
+    /// Mean PSNR of the views that took part, each in its exposure, before and after, dB.
     pub psnr_db: [f64; 2],
-    /// The view that did not, and its PSNR before and after, dB.
+    /// The view that did not, where one was held out.
     pub held_out: Option<HeldOut>,
     /// Factors of the views' exposures, RGB, in the order of the views.
     pub exposures: Vec<[f32; 3]>,
@@ -141,25 +66,20 @@ pub struct Refinement {
 pub struct HeldOut {
     /// Its name.
     pub view: String,
-    /// Before and after, dB.
+    /// Its PSNR before and after, dB.
     pub psnr_db: [f64; 2],
 }
 
-/// What one vehicle's refinement works with.
-struct Work<'a> {
-    views: &'a [View],
-    targets: Vec<Target>,
-    clones: &'a [Tied],
-    options: &'a RefineOptions,
-    radius_m: f32,
-    renderer: CpuRenderer,
-    render: RenderOptions,
-    // Reused from step to step.
-    gaussians: Gaussians,
-    picture: Rendered,
-    of_picture: PictureGradient,
-    gradients: Gradients,
-}
+/// Looks at the view that was held out, or at the mean loss, in the course of a refinement.
+const LOOKS: u32 = 20;
+/// So many looks in a row may be worse than the best.
+const PATIENCE: u32 = 4;
+/// A mean loss this many times that of the first round never comes back.
+const DIVERGED: f64 = 2.0;
+/// Rounds over the views that tell how long a step takes, at the full step size.
+const TIMED_ROUNDS: u32 = 2;
+/// Step sizes at the end, as a share of those at the beginning.
+const LAST_RATE: f32 = 0.1;
 
 /// Moves the Gaussians until their pictures are those of the views. The last ones are `clones`, mirror images of those
 /// before; they follow. Views are pinholes in the frame whose plane of symmetry is y = 0.
@@ -170,186 +90,138 @@ pub(crate) fn refine(
     options: &RefineOptions,
     context: &Context,
 ) -> Result<(Gaussians, Refinement)> {
-    let mut knobs = *options;
-    for (name, field) in [("VGR_MEANS", &mut knobs.rates.means), ("VGR_ROT", &mut knobs.rates.rotations), ("VGR_SCALE", &mut knobs.rates.scales), ("VGR_OP", &mut knobs.rates.opacities), ("VGR_COL", &mut knobs.rates.colors), ("VGR_VIEW", &mut knobs.rates.view_dependence), ("VGR_SIL", &mut knobs.silhouette)] {
-        if let Ok(v) = std::env::var(name) { *field = v.parse().unwrap(); }
-    }
-    if std::env::var_os("VGR_NOEXP").is_some() { knobs.exposure = false; }
-    if std::env::var_os("VGR_NOHOLD").is_some() { knobs.hold_out = false; }
-    let options = &knobs;
+    let start = Instant::now();
     gaussians.truncate(gaussians.len() - clones.len());
-    let mut parameters = Parameters::of(&gaussians);
     let mut work = Work::new(&gaussians, clones, views, options);
-    let mut optimizer = Optimizer::new(&parameters, NOISE);
-    let mut exposure = Exposure::new(views.len());
+    let beginning = State { parameters: Parameters::of(&gaussians), exposure: Exposure::new(views.len()) };
+    let mut state = beginning.clone();
+    drop(gaussians);
     let held_out = (options.hold_out && views.len() >= 3).then_some(views.len() / 2);
     let shown: Vec<usize> = (0..views.len()).filter(|v| Some(*v) != held_out).collect();
+    let round = shown.len() as u32;
+    let before = work.psnr_db(&state, context)?;
+    let setup = start.elapsed();
 
-    let before = work.psnr_of_all(&parameters, &exposure, context)?;
-    let judged = |psnr: &[f64]| held_out.map_or_else(|| mean(shown.iter().map(|&v| psnr[v])), |v| psnr[v]);
-    let mut best = (0u32, judged(&before), before.clone(), parameters.clone(), exposure.clone());
     let mut planned = match options.amount {
-        Amount::Iterations(n) => n,
-        Amount::Seconds(_) => u32::MAX,
+        Amount::Iterations(n) => Some(n),
+        Amount::Seconds(_) => None,
     };
+    let mut course = Course::default();
+    let mut best = Best { error: f64::INFINITY, step: 0, state: state.clone() };
+    if let Some(v) = held_out {
+        best.error = -before[v];
+    }
     let (mut made, mut stop) = (0, Stop::Done);
-    let start = Instant::now();
-    let mut worse = 0;
-    while made < planned {
-        let view = shown[made as usize % shown.len()];
-        let rates = options.rates.times(decay(made, planned));
-        work.step(view, &mut parameters, &mut optimizer, &mut exposure, &rates, context)?;
+    let mut looks_in_vain = 0;
+    while planned.is_none_or(|n| made < n) {
+        let timed = TIMED_ROUNDS * round;
+        let rates = options.rates.times(decay(made, timed, planned));
+        let view = shown[(made % round) as usize];
+        course.push(work.step(view, &mut state, &rates, context)?, round);
         made += 1;
-        if planned == u32::MAX && made as usize == TIMED_ROUNDS * shown.len() {
-            planned = fitting(options.amount, made, start.elapsed().as_secs_f64());
+        if let (None, Amount::Seconds(seconds)) = (planned, options.amount)
+            && made == timed
+        {
+            let step = (start.elapsed() - setup).as_secs_f64() / f64::from(made);
+            planned = Some(fitting(seconds, setup.as_secs_f64(), step).max(made));
         }
+        let Some(planned) = planned else { continue };
         context.report("refine", f64::from(made) / f64::from(planned))?;
-        let every = (planned / EVALUATIONS).max(1);
-        if made % every == 0 || made == planned {
-            let psnr = work.psnr_of_all(&parameters, &exposure, context)?;
-            let now = judged(&psnr);
-            if now > best.1 {
-                best = (made, now, psnr, parameters.clone(), exposure.clone());
-                worse = 0;
-            } else {
-                worse += 1;
-            }
-            if now < judged(&before) - DIVERGED_DB {
-                stop = Stop::Diverged;
-                break;
-            }
-            if worse >= PATIENCE && made < planned {
-                stop = Stop::HeldOut;
-                break;
-            }
+        let every = (planned / LOOKS).max(round);
+        if made % every != 0 && made != planned {
+            continue;
+        }
+        let error = match held_out {
+            Some(v) => -work.psnr_of(v, &state, context)?,
+            None => course.last,
+        };
+        if error < best.error {
+            best = Best { error, step: made, state: state.clone() };
+            looks_in_vain = 0;
+        } else {
+            looks_in_vain += 1;
+        }
+        if course.last > DIVERGED * course.first() {
+            stop = Stop::Diverged;
+            break;
+        }
+        if held_out.is_some() && looks_in_vain >= PATIENCE && made < planned {
+            stop = Stop::HeldOut;
+            break;
         }
     }
-    let (kept, _, after, parameters, exposure) = best;
-    tie::made(&parameters, clones, &mut work.gaussians);
-    let report = Refinement {
-        iterations: planned,
-        kept,
-        made,
-        stop,
-        psnr_db: [&before, &after].map(|psnr| mean(shown.iter().map(|&v| psnr[v]))),
-        held_out: held_out.map(|v| HeldOut { view: views[v].name.clone(), psnr_db: [before[v], after[v]] }),
-        exposures: (0..views.len()).map(|v| exposure.factor(v)).collect(),
+    let after = work.psnr_db(&best.state, context)?;
+    // What is judged by its own loss alone may have begun better than it ever was later.
+    let shown_mean = |psnr: &[f64]| shown.iter().map(|&v| psnr[v]).sum::<f64>() / f64::from(round);
+    let (best, after) = match held_out.is_none() && shown_mean(&after) < shown_mean(&before) {
+        true => (Best { error: 0.0, step: 0, state: beginning }, before.clone()),
+        false => (best, after),
     };
-    Ok((work.gaussians, report))
+    let report = Refinement {
+        iterations: planned.unwrap_or(made),
+        made,
+        kept: best.step,
+        stop,
+        loss: [course.first(), course.last],
+        psnr_db: [shown_mean(&before), shown_mean(&after)],
+        held_out: held_out.map(|v| HeldOut { view: views[v].name.clone(), psnr_db: [before[v], after[v]] }),
+        exposures: (0..views.len()).map(|v| best.state.exposure.factor(v)).collect(),
+    };
+    Ok((work.finished(&best.state, context), report))
 }
 
-/// Gradients below this of a mean over pixels are noise of single pixels.
-const NOISE: f32 = 1e-9;
-/// Times that the views are looked at, about.
-const EVALUATIONS: u32 = 20;
-/// So often may the view that takes no part be worse than at its best.
-const PATIENCE: u32 = 4;
-/// Views that are worse than at the beginning by this never come back.
-const DIVERGED_DB: f64 = 3.0;
-/// Rounds over the views that tell how long a step takes.
-const TIMED_ROUNDS: usize = 2;
-/// Step sizes at the end, as a share of those at the beginning.
-const LAST_RATE: f32 = 0.1;
-
-/// Share of the step size at a step: falls exponentially, as in 3DGS.
-fn decay(step: u32, of: u32) -> f32 {
-    LAST_RATE.powf(step as f32 / of as f32)
-}
-
-/// Steps that fit into the time, of which `made` took `seconds`.
-fn fitting(amount: Amount, made: u32, seconds: f64) -> u32 {
-    match amount {
-        Amount::Iterations(n) => n,
-        Amount::Seconds(budget) => ((budget / (seconds / f64::from(made))) as u32).max(made),
+/// Share of the step size at a step: the full one while steps are timed, then it falls exponentially, as in 3DGS.
+fn decay(step: u32, timed: u32, planned: Option<u32>) -> f32 {
+    match planned {
+        Some(planned) if step > timed => {
+            LAST_RATE.powf((step - timed) as f32 / planned.saturating_sub(timed).max(1) as f32)
+        }
+        _ => 1.0,
     }
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, n) = values.fold((0.0, 0usize), |(sum, n), v| (sum + v, n + 1));
-    sum / n.max(1) as f64
+/// Steps of `step` seconds that fit into `seconds`, of which setting up took `setup`, and a last look takes about as
+/// much.
+fn fitting(seconds: f64, setup: f64, step: f64) -> u32 {
+    ((seconds - 2.0 * setup) / step) as u32
 }
 
-impl<'a> Work<'a> {
-    fn new(originals: &Gaussians, clones: &'a [Tied], views: &'a [View], options: &'a RefineOptions) -> Self {
-        let radius_m = originals
-            .bounds()
-            .map_or(1.0, |(low, high)| 0.5 * (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f32>().sqrt());
-        Self {
-            views,
-            targets: views.iter().map(Target::of).collect(),
-            clones,
-            options,
-            radius_m: radius_m.clamp(1e-3, 1e3),
-            renderer: CpuRenderer::new(),
-            render: RenderOptions { background: Background::Transparent, ..RenderOptions::default() },
-            gaussians: Gaussians::default(),
-            picture: Rendered::default(),
-            of_picture: PictureGradient::default(),
-            gradients: Gradients::default(),
+/// Everything that steps change.
+#[derive(Clone, Debug)]
+struct State {
+    parameters: Parameters,
+    exposure: Exposure,
+}
+
+/// The state that was best, and after which step.
+struct Best {
+    error: f64,
+    step: u32,
+    state: State,
+}
+
+/// Mean losses of the first and of the last round.
+#[derive(Debug, Default)]
+struct Course {
+    recent: VecDeque<f64>,
+    first: Option<f64>,
+    last: f64,
+}
+
+impl Course {
+    fn push(&mut self, loss: f64, round: u32) {
+        self.recent.push_back(loss);
+        if self.recent.len() > round as usize {
+            self.recent.pop_front();
+        }
+        self.last = self.recent.iter().sum::<f64>() / self.recent.len() as f64;
+        if self.recent.len() == round as usize {
+            self.first.get_or_insert(self.last);
         }
     }
 
-    fn step(
-        &mut self,
-        view: usize,
-        parameters: &mut Parameters,
-        optimizer: &mut Optimizer,
-        exposure: &mut Exposure,
-        rates: &Rates,
-        context: &Context,
-    ) -> Result<()> {
-        let Self {
-            views,
-            targets,
-            clones,
-            options,
-            radius_m,
-            renderer,
-            render,
-            gaussians,
-            picture,
-            of_picture,
-            gradients,
-            ..
-        } = self;
-        context.parallel(|| {
-            tie::made(parameters, clones, gaussians);
-            let mut loss = target::Loss::default();
-            let of_loss = |picture: &Rendered, of_picture: &mut PictureGradient| {
-                loss = targets[view].loss(picture, exposure.factor(view), options, Some(of_picture));
-                Ok(())
-            };
-            renderer.render_with_gradients_into(
-                gaussians,
-                &views[view].camera,
-                render,
-                (picture, of_picture, gradients),
-                of_loss,
-            )?;
-            tie::gather(gradients, clones, parameters.len(), parameters.sh_degree);
-            optimizer.step(parameters, gradients, rates, *radius_m);
-            if options.exposure {
-                exposure.step(view, loss.of_exposure, rates.colors);
-            }
-            Ok(())
-        })
-    }
-
-    fn psnr_of_all(
-        &mut self,
-        parameters: &Parameters,
-        exposure: &Exposure,
-        context: &Context,
-    ) -> Result<Vec<f64>> {
-        let Self { views, targets, clones, options, renderer, render, gaussians, picture, .. } = self;
-        context.parallel(|| {
-            tie::made(parameters, clones, gaussians);
-            (0..views.len())
-                .map(|v| {
-                    renderer.render_into(gaussians, &views[v].camera, render, picture)?;
-                    Ok(targets[v].loss(picture, exposure.factor(v), options, None).psnr_db())
-                })
-                .collect()
-        })
+    /// Of steps fewer than a round, their mean.
+    fn first(&self) -> f64 {
+        self.first.unwrap_or(self.last)
     }
 }

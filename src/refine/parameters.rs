@@ -101,10 +101,6 @@ impl Parameters {
         self.log_scales[i].map(f32::exp)
     }
 
-    pub(super) fn opacity(&self, i: usize) -> f32 {
-        sigmoid(self.logits[i])
-    }
-
     /// Back inside the bounds, where a step has left them.
     pub(super) fn bound(&mut self) {
         let Self { log_scales, logits, rotations, .. } = self;
@@ -115,21 +111,6 @@ impl Parameters {
             *q = crate::gaussians::buffer::normalize_quaternion(*q).unwrap_or([1.0, 0.0, 0.0, 0.0]);
         });
     }
-
-    pub(super) fn retain(&mut self, keep: &[bool]) {
-        let stride = self.stride();
-        retain(&mut self.means, keep);
-        retain(&mut self.rotations, keep);
-        retain(&mut self.log_scales, keep);
-        retain(&mut self.logits, keep);
-        let rows = self.sh.chunks_exact(stride).zip(keep).filter(|(_, keep)| **keep);
-        self.sh = rows.flat_map(|(row, _)| row.iter().copied()).collect();
-    }
-}
-
-fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
-    let mut keep = keep.iter();
-    values.retain(|_| keep.next().is_none_or(|keep| *keep));
 }
 
 pub(super) fn sigmoid(x: f32) -> f32 {
@@ -149,14 +130,13 @@ pub(super) struct Optimizer {
 }
 
 impl Optimizer {
-    pub(super) fn new(of: &Parameters, noise: f32) -> Self {
-        let n = of.len();
+    pub(super) fn new(n: usize, sh_degree: u8, noise: f32) -> Self {
         Self {
             means: Adam::new(3 * n, noise),
             rotations: Adam::new(4 * n, noise),
             scales: Adam::new(3 * n, noise),
             opacities: Adam::new(n, noise),
-            sh: Adam::new(of.sh.len(), noise),
+            sh: Adam::new(3 * n * sh::coefficients(sh_degree), noise),
             gradient: Vec::new(),
         }
     }
@@ -190,28 +170,5 @@ impl Optimizer {
         let rate = |k: usize| if k % stride < 3 { rates.colors } else { rates.view_dependence };
         self.sh.step(&mut parameters.sh, &gradients.sh, rate);
         parameters.bound();
-    }
-
-    pub(super) fn retain(&mut self, keep: &[bool], stride: usize) {
-        self.means.retain(keep, 3);
-        self.rotations.retain(keep, 4);
-        self.scales.retain(keep, 3);
-        self.opacities.retain(keep, 1);
-        self.sh.retain(keep, stride);
-    }
-
-    /// Room for parameters that were added at the end.
-    pub(super) fn extend(&mut self, parameters: &Parameters) {
-        let n = parameters.len();
-        self.means.extend(3 * n);
-        self.rotations.extend(4 * n);
-        self.scales.extend(3 * n);
-        self.opacities.extend(n);
-        self.sh.extend(parameters.sh.len());
-    }
-
-    /// After all opacities were set anew.
-    pub(super) fn forget_opacities(&mut self) {
-        self.opacities.forget();
     }
 }
