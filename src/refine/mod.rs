@@ -91,6 +91,22 @@ pub(crate) fn refine(
     context: &Context,
 ) -> Result<(Gaussians, Refinement)> {
     let start = Instant::now();
+    let mut knobs = *options;
+    for (name, field) in [
+        ("VGR_MEANS", &mut knobs.rates.means),
+        ("VGR_ROT", &mut knobs.rates.rotations),
+        ("VGR_SCALE", &mut knobs.rates.scales),
+        ("VGR_OP", &mut knobs.rates.opacities),
+        ("VGR_COL", &mut knobs.rates.colors),
+        ("VGR_VIEW", &mut knobs.rates.view_dependence),
+        ("VGR_SIL", &mut knobs.silhouette),
+        ("VGR_DEPTH", &mut knobs.depth),
+    ] {
+        if let Ok(v) = std::env::var(name) {
+            *field = v.parse().unwrap();
+        }
+    }
+    let options = &knobs;
     gaussians.truncate(gaussians.len() - clones.len());
     let mut work = Work::new(&gaussians, clones, views, options);
     let beginning = State { parameters: Parameters::of(&gaussians), exposure: Exposure::new(views.len()) };
@@ -99,7 +115,7 @@ pub(crate) fn refine(
     let held_out = (options.hold_out && views.len() >= 3).then_some(views.len() / 2);
     let shown: Vec<usize> = (0..views.len()).filter(|v| Some(*v) != held_out).collect();
     let round = shown.len() as u32;
-    let before = work.psnr_db(&state, context)?;
+    let before = work.begin(&state, context)?;
     let setup = start.elapsed();
 
     let mut planned = match options.amount {

@@ -26,6 +26,9 @@ pub struct RefineOptions {
     pub ssim: f32,
     /// Weight of the mean absolute difference of alpha and mask.
     pub silhouette: f32,
+    /// Weight, per metre, of the mean absolute difference of depth to where the surface was at the beginning: what
+    /// pictures do not tell stays where it was measured.
+    pub depth: f32,
     /// Whether each view has an exposure of its own.
     pub exposure: bool,
     /// Whether one of three or more views takes no part and tells when to stop.
@@ -43,9 +46,11 @@ impl Default for RefineOptions {
                 opacities: 2.5e-2,
                 colors: 2.5e-3,
                 view_dependence: 1.25e-4,
+                exposure: 5e-3,
             },
             ssim: 0.2,
             silhouette: 0.5,
+            depth: 0.0,
             exposure: true,
             hold_out: false,
         }
@@ -67,7 +72,7 @@ impl RefineOptions {
             }
             _ => {}
         }
-        for (name, weight) in [("ssim", self.ssim), ("silhouette", self.silhouette)] {
+        for (name, weight) in [("ssim", self.ssim), ("silhouette", self.silhouette), ("depth", self.depth)] {
             if !(0.0..=1.0).contains(&weight) {
                 return refuse(name, weight.to_string(), "0 to 1");
             }

@@ -47,11 +47,13 @@ pub struct Rates {
     pub colors: f32,
     /// Of SH bands 1 and above.
     pub view_dependence: f32,
+    /// Of the logarithm of a view's exposure.
+    pub exposure: f32,
 }
 
 impl Rates {
-    pub(super) fn named(&self) -> [(&'static str, f32); 6] {
-        let Self { means, rotations, scales, opacities, colors, view_dependence } = *self;
+    pub(super) fn named(&self) -> [(&'static str, f32); 7] {
+        let Self { means, rotations, scales, opacities, colors, view_dependence, exposure } = *self;
         [
             ("means", means),
             ("rotations", rotations),
@@ -59,15 +61,22 @@ impl Rates {
             ("opacities", opacities),
             ("colors", colors),
             ("view_dependence", view_dependence),
+            ("exposure", exposure),
         ]
     }
 
     /// All of them times `factor`.
     pub(super) fn times(&self, factor: f32) -> Self {
-        let Self { means, rotations, scales, opacities, colors, view_dependence } = *self;
-        let [means, rotations, scales, opacities, colors, view_dependence] =
-            [means, rotations, scales, opacities, colors, view_dependence].map(|rate| rate * factor);
-        Self { means, rotations, scales, opacities, colors, view_dependence }
+        let Self { means, rotations, scales, opacities, colors, view_dependence, exposure } = *self;
+        Self {
+            means: means * factor,
+            rotations: rotations * factor,
+            scales: scales * factor,
+            opacities: opacities * factor,
+            colors: colors * factor,
+            view_dependence: view_dependence * factor,
+            exposure: exposure * factor,
+        }
     }
 }
 

@@ -16,6 +16,8 @@ pub(super) struct Target {
     color: Vec<[f32; 3]>,
     /// 1 where vehicle, 0 where background, NaN where unknown. `[height * width]`
     alpha: Vec<f32>,
+    /// Metres, as drawn at the beginning; 0 where nothing holds it. `[height * width]`
+    depth: Vec<f32>,
     /// 1 / pixels that count.
     share: f32,
 }
@@ -49,7 +51,16 @@ impl Target {
             })
             .collect();
         let known = alpha.iter().filter(|a| !a.is_nan()).count().max(1);
-        Self { color: metrics::on_white(view), alpha, share: 1.0 / known as f32 }
+        Self { color: metrics::on_white(view), alpha, depth: Vec::new(), share: 1.0 / known as f32 }
+    }
+
+    /// Holds the surface where this picture has it, inside the mask.
+    pub(super) fn hold(&mut self, picture: &Rendered) {
+        let drawn = picture.alpha.iter().zip(&picture.depth).zip(&self.alpha);
+        let held = |((drawn, depth), alpha): ((&f32, &f32), &f32)| {
+            if *drawn > 0.5 && *alpha == 1.0 { *depth } else { 0.0 }
+        };
+        self.depth = drawn.map(held).collect();
     }
 
     /// The loss of a picture drawn on nothing and shown with `factor`; adds to its gradient where one is wanted.
@@ -64,6 +75,9 @@ impl Target {
         if let Some(gradient) = gradient.as_deref_mut() {
             gradient.color_mut();
             gradient.alpha_mut();
+            if options.depth > 0.0 {
+                gradient.depth_mut();
+            }
         }
         let third = self.share / 3.0;
         for i in 0..self.alpha.len() {
@@ -87,6 +101,11 @@ impl Target {
             }
             if let Some(gradient) = gradient.as_deref_mut() {
                 gradient.alpha[i] += of_alpha;
+                if options.depth > 0.0 && self.depth[i] > 0.0 {
+                    let off = picture.depth[i] - self.depth[i];
+                    gradient.depth[i] += options.depth * self.share * off.signum();
+                    loss.total += f64::from(options.depth * self.share * off.abs());
+                }
             }
         }
         loss

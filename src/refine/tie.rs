@@ -94,3 +94,110 @@ pub(super) fn gather(gradients: &mut Gradients, clones: &[Clone], n: usize, sh_d
     gradients.opacities.truncate(n);
     gradients.sh.truncate(n * stride);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers in (-1, 1) that look random.
+    fn numbers(n: usize, seed: u32) -> Vec<f32> {
+        (0..n).map(|i| ((i as f32 + 1.0) * 12.9898 + seed as f32 * 78.233).sin()).collect()
+    }
+
+    fn threes(n: usize, seed: u32) -> Vec<[f32; 3]> {
+        numbers(3 * n, seed).chunks_exact(3).map(|v| [v[0], v[1], v[2]]).collect()
+    }
+
+    fn fours(n: usize, seed: u32) -> Vec<[f32; 4]> {
+        numbers(4 * n, seed).chunks_exact(4).map(|v| [v[0], v[1], v[2], v[3]]).collect()
+    }
+
+    fn some(n: usize, degree: u8) -> Parameters {
+        Parameters {
+            sh_degree: degree,
+            means: threes(n, 1),
+            rotations: fours(n, 2),
+            log_scales: threes(n, 3),
+            logits: numbers(n, 4),
+            sh: numbers(n * 3 * sh::coefficients(degree), 5),
+        }
+    }
+
+    const CLONES: [Clone; 3] = [
+        Clone { of: 4, gain: [1.0, 1.0, 1.0] },
+        Clone { of: 0, gain: [0.5, 1.25, 2.0] },
+        Clone { of: 2, gain: [0.9, 0.8, 0.7] },
+    ];
+
+    #[test]
+    fn clones_are_the_mirror_images_that_the_symmetry_makes() {
+        let parameters = some(5, 2);
+        let mut all = Gaussians::default();
+        made(&parameters, &CLONES, &mut all);
+        let mut originals = all.clone();
+        originals.truncate(5);
+        let mirrored = originals.mirrored();
+        for (k, clone) in CLONES.iter().enumerate() {
+            let (at, of) = (5 + k, clone.of as usize);
+            assert_eq!(all.means()[at], mirrored.means()[of]);
+            assert_eq!(all.rotations()[at], mirrored.rotations()[of]);
+            assert_eq!(all.scales()[at], mirrored.scales()[of]);
+            assert_eq!(all.opacities()[at], mirrored.opacities()[of]);
+        }
+        // The first has the light of its original.
+        let stride = all.sh_stride();
+        assert_eq!(all.sh()[5 * stride..6 * stride], mirrored.sh()[4 * stride..5 * stride]);
+        // The second is shown 0.5, 1.25 and 2 times as bright from everywhere.
+        let from = [0.6, -0.64, 0.48];
+        let color = |g: &Gaussians, i: usize| sh::color(&g.sh()[i * stride..(i + 1) * stride], from, 2);
+        for (c, gain) in [0.5, 1.25, 2.0].into_iter().enumerate() {
+            let (clone, original) = (color(&all, 6)[c], color(&mirrored, 0)[c]);
+            assert!(original <= 0.0 || (clone - gain * original).abs() < 1e-5, "{clone} {original}");
+        }
+    }
+
+    #[test]
+    fn gathering_is_the_adjoint_of_making() {
+        let n = 5;
+        let degree = 3;
+        let stride = 3 * sh::coefficients(degree);
+        let all = n + CLONES.len();
+        let of_all = Gradients {
+            means: threes(all, 11),
+            rotations: fours(all, 12),
+            scales: threes(all, 13),
+            opacities: numbers(all, 14),
+            sh: numbers(all * stride, 15),
+            ..Gradients::default()
+        };
+        let dot = |g: &Gaussians, of: &Gradients| -> f64 {
+            let sum = |a: &[f32], b: &[f32]| -> f64 {
+                assert_eq!(a.len(), b.len());
+                a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
+            };
+            sum(g.means().as_flattened(), of.means.as_flattened())
+                + sum(g.rotations().as_flattened(), of.rotations.as_flattened())
+                + sum(g.scales().as_flattened(), of.scales.as_flattened())
+                + sum(g.opacities(), &of.opacities)
+                + sum(g.sh(), &of.sh)
+        };
+        // Making is affine in what the gradients are of: two states differ by J (x - y).
+        let mut other = some(n, degree);
+        other.means = threes(n, 21);
+        other.rotations = fours(n, 22);
+        other.log_scales = threes(n, 23);
+        other.logits = numbers(n, 24);
+        other.sh = numbers(n * stride, 25);
+        let difference = |clones: &[Clone], of: &Gradients| {
+            let (mut x, mut y) = (Gaussians::default(), Gaussians::default());
+            made(&some(n, degree), clones, &mut x);
+            made(&other, clones, &mut y);
+            dot(&x, of) - dot(&y, of)
+        };
+        let expected = difference(&CLONES, &of_all);
+        let mut gathered = of_all;
+        gather(&mut gathered, &CLONES, n, degree);
+        let found = difference(&[], &gathered);
+        assert!((found - expected).abs() < 1e-4 * expected.abs().max(1.0), "{found} {expected}");
+    }
+}

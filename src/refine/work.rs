@@ -83,9 +83,23 @@ impl<'a> Work<'a> {
             tie::gather(gradients, clones, parameters.len(), parameters.sh_degree);
             optimizer.step(parameters, gradients, rates, *radius_m);
             if options.exposure {
-                exposure.step(view, loss.of_exposure, rates.colors);
+                exposure.step(view, loss.of_exposure, rates.exposure);
             }
             Ok(loss.total)
+        })
+    }
+
+    /// Holds the surface where `state` has it; what [`Work::psnr_db`] of it says.
+    pub(super) fn begin(&mut self, state: &State, context: &Context) -> Result<Vec<f64>> {
+        context.parallel(|| {
+            tie::made(&state.parameters, self.clones, &mut self.gaussians);
+            let views = self.views.len();
+            let one = |view: usize| {
+                let psnr = self.psnr_drawn(view, state)?;
+                self.targets[view].hold(&self.picture);
+                Ok(psnr)
+            };
+            (0..views).map(one).collect()
         })
     }
 
