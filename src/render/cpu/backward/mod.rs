@@ -234,8 +234,6 @@ fn project_all<S: Lanes>(
 fn pose_gradient(camera: &Camera, total: &CameraSums) -> PoseGradient {
     let pose = &camera.vehicle_from_camera;
     let rows = |k: usize| DVec3::new(total[k], total[k + 1], total[k + 2]);
-    let rotation_entries = DMat3::from_cols(rows(0), rows(3), rows(6)).transpose();
-    // p = R (m - c), and the directions of colour are m - c.
-    let center = pose.rotation.transpose() * rows(12) - rows(9);
-    PoseGradient::new(pose, rotation_entries, center)
+    let entries = DMat3::from_cols(rows(0), rows(3), rows(6)).transpose();
+    PoseGradient::new(pose, entries, rows(9), rows(12))
 }
