@@ -5,7 +5,7 @@ mod common;
 use common::golden::{camera, gaussians, golden};
 use common::npz::Npz;
 use vg::gaussians::sh;
-use vg::render::{Background, CpuRenderer, DepthMode, Differentiable, Gradients, PictureGradient, RenderOptions};
+use vg::render::{Background, CpuRenderer, DepthMode, Differentiable, Gradients, PictureGradient, Reference, RenderOptions};
 use vg::Camera;
 
 /// |a - b| / |b| as vectors.
@@ -97,4 +97,9 @@ fn check_golden(name: &str, renderer: &impl Differentiable, tolerance: f64) {
 fn the_gradients_agree_with_gsplats_autograd_to_1e_4_of_each_tensor() {
     check_golden("avx2", &CpuRenderer::new(), 1e-4);
     check_golden("portable", &CpuRenderer::portable(), 1e-4);
+}
+
+#[test]
+fn the_reference_agrees_with_gsplats_autograd_to_1e_5() {
+    check_golden("f64", &Reference, 1e-5);
 }

@@ -5,7 +5,9 @@
 //! sum of T alpha z, divided by the resampled alpha in the end: these sums are linear, so an interpolated pixel is
 //! what blending between its neighbours would have drawn, and empty neighbours do not pull its depth towards 0.
 
-use super::{Background, DepthMode, PictureGradient, RenderOptions, Rendered, Renderer};
+use super::{
+    Background, DepthMode, Differentiable, Gradients, PictureGradient, RenderOptions, Rendered, Renderer,
+};
 use crate::error::Result;
 use crate::gaussians::Gaussians;
 use crate::geometry::Camera;
@@ -170,6 +172,28 @@ pub fn render(
     camera.validate("camera")?;
     options.validate()?;
     LensMap::new(camera)?.render(renderer, gaussians, camera, options)
+}
+
+/// Gradients through a lens, by a renderer that is differentiated for pinholes.
+pub(super) fn backward(
+    renderer: &impl Differentiable,
+    gaussians: &Gaussians,
+    camera: &Camera,
+    options: &RenderOptions,
+    gradient: &PictureGradient,
+) -> Result<Gradients> {
+    camera.validate("camera")?;
+    options.validate()?;
+    gradient.validate(camera)?;
+    let map = LensMap::new(camera)?;
+    let (pinhole, fine) = map.pinhole(camera, options);
+    let fine_picture = renderer.render(gaussians, &pinhole, &fine)?;
+    let (mut picture, mut of_fine) = (Rendered::default(), PictureGradient::default());
+    map.resample(&fine_picture, options, &mut picture);
+    of_fine.reset(&fine_picture);
+    let background = map.scatter(&picture, options, gradient, &mut of_fine);
+    let gradients = renderer.backward(gaussians, &pinhole, &fine, &of_fine)?;
+    Ok(Gradients { background, ..gradients })
 }
 
 /// Premultiplied colour, alpha and accumulated depth, bilinear; edges repeated; nothing at NaN.

@@ -11,7 +11,7 @@ pub use cpu::CpuRenderer;
 pub use gradient::{Differentiable, Gradients, PictureGradient, PoseGradient};
 pub use options::{Background, DepthMode, RenderOptions};
 pub use output::Rendered;
-pub use reference::Reference;
+pub use reference::{Reference, ReferenceGradients};
 
 use crate::error::Result;
 use crate::gaussians::Gaussians;
