@@ -32,7 +32,8 @@ fn main() {
         "{:18} {:>7} {:>8} {:>11} {:>8} {:>11} {:>8}",
         "scene", "threads", "", "wall median", "min", "CPU median", "min"
     );
-    for (name, gaussians) in [("car, 200,000", scenes::surfel_car(200_000)), ("dense, 30,000", dense(30_000))] {
+    for (name, gaussians) in [("car, 200,000", scenes::surfel_car(200_000)), ("dense, 30,000", dense(30_000))]
+    {
         let gradients =
             [1, 2].map(|threads| time(name, &renderer, &gaussians, &camera, threads, has("--stages")));
         assert!(gradients[0] == gradients[1], "1 and 2 threads give different gradients");

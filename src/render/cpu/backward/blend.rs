@@ -53,15 +53,15 @@ impl TileGradient {
         Self { blocks: [Behind { color: [ZERO; 3], depth: ZERO, sum: ZERO }; BLOCKS * TILE_HEIGHT] }
     }
 
-    /// Starts behind the last layer of `tile`, which has been blended, with `scale` times the picture's gradient.
+    /// Starts behind the last layer of `tile`, which has been blended onto `tape`, with `scale` times the picture's gradient.
     /// Returns the gradient of the background's colour.
     pub(super) fn start(
         &mut self,
-        tile: &Tile,
+        (tile, tape): (&Tile, &Tape),
         [left, top]: [usize; 2],
         options: &RenderOptions,
         gradient: &PictureGradient,
-        scale: f32,
+        scale: f64,
     ) -> [f64; 3] {
         let behind = match options.background {
             Background::Color(rgb) => rgb,
@@ -80,19 +80,19 @@ impl TileGradient {
                 let mut sum = 0.0;
                 if let Some(gc) = gradient.color.get(i) {
                     for c in 0..3 {
-                        let g = scale * gc[c];
+                        let g = (scale * f64::from(gc[c])) as f32;
                         lanes_mut(&mut block.color[c])[l] = g;
                         sum += g * behind[c];
                         background[c] += f64::from(g) * f64::from(t);
                     }
                 }
                 if let Some(ga) = gradient.alpha.get(i) {
-                    sum -= scale * ga;
+                    sum -= (scale * f64::from(*ga)) as f32;
                 }
                 if let Some(gd) = gradient.depth.get(i) {
-                    let mut g = scale * gd;
+                    let mut g = (scale * f64::from(*gd)) as f32;
                     if options.depth_mode == DepthMode::Expected {
-                        let alpha = 1.0 - t;
+                        let alpha = lanes(&tape.covered()[at])[l];
                         g = if alpha > 0.0 { g / alpha } else { 0.0 };
                         sum += if alpha > 0.0 { g * (lanes(&tile.blocks[at].depth)[l] / alpha) } else { 0.0 };
                     }
@@ -157,8 +157,7 @@ impl TileGradient {
                 let weight = simd.mul_f32s(drawn.transmittance, alpha);
                 let w = simd.mul_f32s(weight, simd.sub_f32s(phi, behind.sum));
                 let w = simd.select_f32s(simd.less_than_f32s(alpha, max_alpha), w, ZERO);
-                behind.sum =
-                    simd.mul_add(simd.sub_f32s(one, alpha), behind.sum, simd.mul_f32s(alpha, phi));
+                behind.sum = simd.mul_add(simd.sub_f32s(one, alpha), behind.sum, simd.mul_f32s(alpha, phi));
 
                 let (wt, ws) = (simd.mul_f32s(w, t), simd.mul_f32s(w, s));
                 sum[0] = simd.add_f32s(sum[0], w);
@@ -215,13 +214,7 @@ impl Form {
         }
         let (center, center_rest) = (s.center, s.center_rest);
         if s.conditional < 0.0 {
-            Self {
-                center,
-                center_rest,
-                slope: [-s.slope, 1.0],
-                whiten_t: t,
-                whiten_s: [marginal, 0.0],
-            }
+            Self { center, center_rest, slope: [-s.slope, 1.0], whiten_t: t, whiten_s: [marginal, 0.0] }
         } else {
             Self { center, center_rest, slope: [1.0, -s.slope], whiten_t: t, whiten_s: [0.0, marginal] }
         }

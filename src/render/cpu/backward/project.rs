@@ -146,13 +146,7 @@ struct Outputs {
 
 /// One lane, without branches or closures, so that the compiler turns the loop over lanes into vectors.
 #[inline(always)]
-fn project_lane(
-    view: &PinholeView,
-    g: &Inputs,
-    upstream: &[[f64; LANES]; 10],
-    out: &mut Outputs,
-    l: usize,
-) {
+fn project_lane(view: &PinholeView, g: &Inputs, upstream: &[[f64; LANES]; 10], out: &mut Outputs, l: usize) {
     // Forward once more, with the same formulas as `project`.
     let w = f64::from(g.rotation[0][l]);
     let qx = f64::from(g.rotation[1][l]);
@@ -211,8 +205,7 @@ fn project_lane(
     let inverse_residual = inverse_t / c;
     for k in 0..3 {
         let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-        let (p_i, p_j, p_k) =
-            if pivot_x { (pa[i], pa[j], pa[k]) } else { (pb[i], pb[j], pb[k]) };
+        let (p_i, p_j, p_k) = if pivot_x { (pa[i], pa[j], pa[k]) } else { (pb[i], pb[j], pb[k]) };
         let o_k = if pivot_x { pb[k] } else { pa[k] };
         h_t[k] = (sign * (s2[i] * p_i * n[j] - s2[j] * p_j * n[i]) + e * o_k) * inverse_residual;
         h_s[k] = p_k * inverse_s;
