@@ -159,7 +159,10 @@ fn walk_tiles<S: Lanes>(
             #[inline(always)]
             || super::blend::blend(simd, tile, origin, list, splats, options.max_alpha, tape),
         );
-        *background = behind.start((tile, tape), origin, options, gradient, scale);
+        *background = simd.vectorize(
+            #[inline(always)]
+            || behind.start((tile, tape), origin, options, gradient, scale),
+        );
         simd.vectorize(
             #[inline(always)]
             || behind.walk(simd, tape, origin, splats, options.max_alpha, ids, sums),

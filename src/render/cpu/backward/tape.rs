@@ -83,6 +83,8 @@ impl Tape {
 }
 
 impl Record for Tape {
+    const COLOR: bool = false;
+
     #[inline(always)]
     fn rows(&mut self) {
         let needed = self.len + MOST_PER_CALL;
