@@ -5,7 +5,9 @@
 //! sum of T alpha z, divided by the resampled alpha in the end: these sums are linear, so an interpolated pixel is
 //! what blending between its neighbours would have drawn, and empty neighbours do not pull its depth towards 0.
 
-use super::{Background, DepthMode, PictureGradient, RenderOptions, Rendered, Renderer};
+use super::{
+    Background, DepthMode, Differentiable, Gradients, PictureGradient, RenderOptions, Rendered, Renderer,
+};
 use crate::error::Result;
 use crate::gaussians::Gaussians;
 use crate::geometry::Camera;
@@ -16,6 +18,9 @@ use rayon::prelude::*;
 /// Pinhole pixels per pixel and axis. Interpolating at this spacing keeps the peak of the smallest splat, whose
 /// standard deviation is sqrt(0.3) pixels, to 10 %; its centroid and its sum exactly.
 pub const SUPERSAMPLING: f64 = 2.0;
+
+/// Of a gradient's entries when it is scattered.
+const LARGEST: f32 = 1e34;
 
 /// Largest blur the options accept, pixels^2.
 const MAX_BLUR: f32 = 100.0;
@@ -146,6 +151,9 @@ impl LensMap {
             if position[0].is_nan() {
                 continue;
             }
+            // A gradient near the end of f32 saturates: the sums of its neighbours stay finite.
+            let (alpha, depth) = (alpha.clamp(-LARGEST, LARGEST), depth.clamp(-LARGEST, LARGEST));
+            let color = color.map(|v| v.clamp(-LARGEST, LARGEST));
             let taps = Taps::new(*position, width, height);
             for (at, weight) in taps.index.into_iter().zip(taps.weights()) {
                 for c in 0..3 {
@@ -170,6 +178,28 @@ pub fn render(
     camera.validate("camera")?;
     options.validate()?;
     LensMap::new(camera)?.render(renderer, gaussians, camera, options)
+}
+
+/// Gradients through a lens, by a renderer that is differentiated for pinholes.
+pub(super) fn backward(
+    renderer: &impl Differentiable,
+    gaussians: &Gaussians,
+    camera: &Camera,
+    options: &RenderOptions,
+    gradient: &PictureGradient,
+) -> Result<Gradients> {
+    camera.validate("camera")?;
+    options.validate()?;
+    gradient.validate(camera)?;
+    let map = LensMap::new(camera)?;
+    let (pinhole, fine) = map.pinhole(camera, options);
+    let fine_picture = renderer.render(gaussians, &pinhole, &fine)?;
+    let (mut picture, mut of_fine) = (Rendered::default(), PictureGradient::default());
+    map.resample(&fine_picture, options, &mut picture);
+    of_fine.reset(&fine_picture);
+    let background = map.scatter(&picture, options, gradient, &mut of_fine);
+    let gradients = renderer.backward(gaussians, &pinhole, &fine, &of_fine)?;
+    Ok(Gradients { background, ..gradients })
 }
 
 /// Premultiplied colour, alpha and accumulated depth, bilinear; edges repeated; nothing at NaN.

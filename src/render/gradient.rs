@@ -57,7 +57,7 @@ pub struct PoseGradient {
     /// Per metre along the camera's axes.
     pub translation: DVec3,
     /// dL / d(entry) of `camera_from_vehicle = [R | t; 0 0 0 1]` with all entries free, row by row, where
-    /// `p_camera = R p_vehicle + t` and the camera's centre is `-R^-1 t`; the last row is zero.
+    /// `p_camera = R p_vehicle + t` and colour is seen from the centre `-R^T t`; the last row is zero.
     pub view_matrix: [[f64; 4]; 4],
 }
 
@@ -72,26 +72,29 @@ impl PoseGradient {
         }
     }
 
-    /// From the gradients of the camera frame's points and directions.
-    ///
-    /// With `p = R (m - c)`: `rotation_entries` is dL/dR at fixed centre c, `center` dL/dc along the camera's axes.
-    pub(crate) fn new(pose: &Pose, rotation_entries: DMat3, center: DVec3) -> Self {
+    /// From sums over Gaussians: dL/dR of `p = R (m - c)` at fixed centre c, dL/dp, and the part of dL/dc that comes
+    /// through the directions colour is seen along.
+    pub(crate) fn new(pose: &Pose, entries: DMat3, point: DVec3, center_of_directions: DVec3) -> Self {
         let r = pose.rotation.transpose();
-        let m = rotation_entries * r.transpose();
+        let c = pose.translation;
         // R(w) = exp(-[w]) R and c(v) = c + R^T v.
-        let entry = |row: usize, column: usize| m.col(column)[row];
-        let rotation =
-            DVec3::new(entry(1, 2) - entry(2, 1), entry(2, 0) - entry(0, 2), entry(0, 1) - entry(1, 0));
-        // c = -R^-1 t: dL/dt = -R^-T dL/dc, and dL/dR gains dL/dt c^T.
-        let (t, c) = (-center, pose.translation);
+        let m = entries * pose.rotation;
+        let at = |row: usize, column: usize| m.col(column)[row];
+        let rotation = DVec3::new(at(1, 2) - at(2, 1), at(2, 0) - at(0, 2), at(0, 1) - at(1, 0));
+        let translation = r * center_of_directions - point;
+
+        // p = R m + t, and c = -R^T t in the directions.
+        let t = -(r * c);
+        let outer = |a: DVec3, b: DVec3| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
+        let of_rotation = entries + outer(point, c) - outer(t, center_of_directions);
         let mut view_matrix = [[0.0; 4]; 4];
         for row in 0..3 {
             for column in 0..3 {
-                view_matrix[row][column] = rotation_entries.col(column)[row] + t[row] * c[column];
+                view_matrix[row][column] = of_rotation.col(column)[row];
             }
-            view_matrix[row][3] = t[row];
+            view_matrix[row][3] = -translation[row];
         }
-        Self { rotation, translation: center, view_matrix }
+        Self { rotation, translation, view_matrix }
     }
 }
 

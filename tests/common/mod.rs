@@ -5,6 +5,8 @@ pub mod golden;
 pub mod npz;
 pub mod sample;
 pub mod scenes;
+pub mod stiff;
+pub mod timing;
 pub mod vehicle;
 
 use std::io::Write;

@@ -15,7 +15,7 @@
 use super::super::blend::block_centers;
 use super::super::simd::Lanes;
 use super::super::splat::Splat;
-use super::super::tile::{BLOCK, BLOCKS, TILE_HEIGHT, TILE_WIDTH, Tile, lanes, lanes_mut};
+use super::super::tile::{BLOCK, BLOCKS, TILE_HEIGHT, TILE_WIDTH, Tile, lanes};
 use super::tape::Tape;
 use crate::render::{Background, DepthMode, PictureGradient, RenderOptions};
 use pulp::f32x8;
@@ -53,15 +53,16 @@ impl TileGradient {
         Self { blocks: [Behind { color: [ZERO; 3], depth: ZERO, sum: ZERO }; BLOCKS * TILE_HEIGHT] }
     }
 
-    /// Starts behind the last layer of `tile`, which has been blended, with `scale` times the picture's gradient.
+    /// Starts behind the last layer of `tile`, which has been blended onto `tape`, with `scale` times the picture's gradient.
     /// Returns the gradient of the background's colour.
+    #[inline(always)]
     pub(super) fn start(
         &mut self,
-        tile: &Tile,
+        (tile, tape): (&Tile, &Tape),
         [left, top]: [usize; 2],
         options: &RenderOptions,
         gradient: &PictureGradient,
-        scale: f32,
+        scale: f64,
     ) -> [f64; 3] {
         let behind = match options.background {
             Background::Color(rgb) => rgb,
@@ -69,36 +70,53 @@ impl TileGradient {
         };
         let (width, height) = (gradient.width as usize, gradient.height as usize);
         let (rows, columns) = ((height - top).min(TILE_HEIGHT), (width - left).min(TILE_WIDTH));
-        self.blocks.fill(Behind { color: [ZERO; 3], depth: ZERO, sum: ZERO });
+        let expected = options.depth_mode == DepthMode::Expected;
         let mut background = [0.0; 3];
-        for r in 0..rows {
-            for x in 0..columns {
-                let (at, l) = (r * BLOCKS + x / BLOCK, x % BLOCK);
-                let i = (top + r) * width + left + x;
-                let t = lanes(&tile.blocks[at].transmittance)[l].abs();
-                let block = &mut self.blocks[at];
-                let mut sum = 0.0;
-                if let Some(gc) = gradient.color.get(i) {
+        for r in 0..TILE_HEIGHT {
+            for b in 0..BLOCKS {
+                let (at, x0) = (r * BLOCKS + b, b * BLOCK);
+                let inside = if r < rows { columns.saturating_sub(x0).min(BLOCK) } else { 0 };
+                let first = (top + r) * width + left + x0;
+                let t = lanes(&tile.blocks[at].transmittance);
+                let (mut color, mut depth, mut sum) = ([[0.0; BLOCK]; 3], [0.0; BLOCK], [0.0; BLOCK]);
+                if inside > 0 && !gradient.color.is_empty() {
+                    let mut total = [0.0; 3];
+                    for (l, gc) in gradient.color[first..first + inside].iter().enumerate() {
+                        for c in 0..3 {
+                            color[c][l] = (scale * f64::from(gc[c])) as f32;
+                            sum[l] += color[c][l] * behind[c];
+                            total[c] += color[c][l] * t[l].abs();
+                        }
+                    }
                     for c in 0..3 {
-                        let g = scale * gc[c];
-                        lanes_mut(&mut block.color[c])[l] = g;
-                        sum += g * behind[c];
-                        background[c] += f64::from(g) * f64::from(t);
+                        background[c] += f64::from(total[c]);
                     }
                 }
-                if let Some(ga) = gradient.alpha.get(i) {
-                    sum -= scale * ga;
-                }
-                if let Some(gd) = gradient.depth.get(i) {
-                    let mut g = scale * gd;
-                    if options.depth_mode == DepthMode::Expected {
-                        let alpha = 1.0 - t;
-                        g = if alpha > 0.0 { g / alpha } else { 0.0 };
-                        sum += if alpha > 0.0 { g * (lanes(&tile.blocks[at].depth)[l] / alpha) } else { 0.0 };
+                if inside > 0 && !gradient.alpha.is_empty() {
+                    for (l, ga) in gradient.alpha[first..first + inside].iter().enumerate() {
+                        sum[l] -= (scale * f64::from(*ga)) as f32;
                     }
-                    lanes_mut(&mut block.depth)[l] = g;
                 }
-                lanes_mut(&mut block.sum)[l] = sum;
+                if inside > 0 && !gradient.depth.is_empty() {
+                    for (l, gd) in gradient.depth[first..first + inside].iter().enumerate() {
+                        depth[l] = (scale * f64::from(*gd)) as f32;
+                    }
+                    if expected {
+                        let covered = lanes(&tape.covered()[at]);
+                        let total = lanes(&tile.blocks[at].depth);
+                        for l in 0..BLOCK {
+                            let alpha = covered[l];
+                            let inverse = if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
+                            depth[l] *= inverse;
+                            sum[l] += depth[l] * (total[l] * inverse);
+                        }
+                    }
+                }
+                self.blocks[at] = Behind {
+                    color: [pulp::cast(color[0]), pulp::cast(color[1]), pulp::cast(color[2])],
+                    depth: pulp::cast(depth),
+                    sum: pulp::cast(sum),
+                };
             }
         }
         if options.background == Background::Transparent { [0.0; 3] } else { background }

@@ -53,11 +53,6 @@ pub(super) fn project(
     unscale: f64,
     out: Chunk,
 ) -> CameraSums {
-    out.means.fill([0.0; 3]);
-    out.rotations.fill([0.0; 4]);
-    out.scales.fill([0.0; 3]);
-    out.opacities.fill(0.0);
-    out.sh.fill(0.0);
     let stride = gaussians.sh_stride();
     let coefficients = sh::coefficients(view.sh_degree);
     let n = out.opacities.len();
@@ -68,7 +63,13 @@ pub(super) fn project(
         let mut index = [0; LANES];
         let mut count = 0;
         while next < n && count < LANES {
-            if sums[next] != [0.0; 10] {
+            if sums[next] == [0.0; 10] {
+                out.means[next] = [0.0; 3];
+                out.rotations[next] = [0.0; 4];
+                out.scales[next] = [0.0; 3];
+                out.opacities[next] = 0.0;
+                out.sh[next * stride..(next + 1) * stride].fill(0.0);
+            } else {
                 index[count] = next;
                 count += 1;
             }
@@ -97,7 +98,9 @@ pub(super) fn project(
             let direction = [g.direction[0][l], g.direction[1][l], g.direction[2][l]];
             let splat = &splats[out.first + i];
             let coefficients_in = &gaussians.sh()[(out.first + i) * stride..][..3 * coefficients];
-            let coefficients_out = &mut out.sh[i * stride..][..3 * coefficients];
+            let (coefficients_out, unused) =
+                out.sh[i * stride..(i + 1) * stride].split_at_mut(3 * coefficients);
+            unused.fill(0.0);
             let turn = color_backward(
                 coefficients_in,
                 direction,
