@@ -91,22 +91,6 @@ pub(crate) fn refine(
     context: &Context,
 ) -> Result<(Gaussians, Refinement)> {
     let start = Instant::now();
-    let mut knobs = *options;
-    for (name, field) in [
-        ("VGR_MEANS", &mut knobs.rates.means),
-        ("VGR_ROT", &mut knobs.rates.rotations),
-        ("VGR_SCALE", &mut knobs.rates.scales),
-        ("VGR_OP", &mut knobs.rates.opacities),
-        ("VGR_COL", &mut knobs.rates.colors),
-        ("VGR_VIEW", &mut knobs.rates.view_dependence),
-        ("VGR_SIL", &mut knobs.silhouette),
-        ("VGR_DEPTH", &mut knobs.depth),
-    ] {
-        if let Ok(v) = std::env::var(name) {
-            *field = v.parse().unwrap();
-        }
-    }
-    let options = &knobs;
     gaussians.truncate(gaussians.len() - clones.len());
     let mut work = Work::new(&gaussians, clones, views, options);
     let beginning = State { parameters: Parameters::of(&gaussians), exposure: Exposure::new(views.len()) };

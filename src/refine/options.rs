@@ -24,7 +24,7 @@ pub struct RefineOptions {
     pub rates: Rates,
     /// Weight of 1 - SSIM beside that of the mean absolute difference of colours, which is the rest to 1.
     pub ssim: f32,
-    /// Weight of the mean absolute difference of alpha and mask.
+    /// Weight of the mean square difference of alpha and mask.
     pub silhouette: f32,
     /// Weight, per metre, of the mean absolute difference of depth to where the surface was at the beginning: what
     /// pictures do not tell stays where it was measured.
@@ -40,7 +40,7 @@ impl Default for RefineOptions {
         Self {
             amount: Amount::Iterations(300),
             rates: Rates {
-                means: 1.6e-4,
+                means: 3e-4,
                 rotations: 1e-3,
                 scales: 5e-3,
                 opacities: 2.5e-2,
@@ -50,7 +50,7 @@ impl Default for RefineOptions {
             },
             ssim: 0.2,
             silhouette: 0.5,
-            depth: 0.0,
+            depth: 0.1,
             exposure: true,
             hold_out: false,
         }

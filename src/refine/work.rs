@@ -1,7 +1,7 @@
 //! One step, and a look at where it led.
 
 use super::parameters::{Optimizer, Rates};
-use super::target::{Loss, Target};
+use super::target::{Loss, Shown, Target};
 use super::tie::{self, Clone as Tied};
 use super::{RefineOptions, State};
 use crate::error::Result;
@@ -27,6 +27,7 @@ pub(super) struct Work<'a> {
     // Reused from step to step.
     gaussians: Gaussians,
     picture: Rendered,
+    shown: Shown,
     of_picture: PictureGradient,
     gradients: Gradients,
 }
@@ -53,6 +54,7 @@ impl<'a> Work<'a> {
             render: RenderOptions { background: Background::Transparent, ..RenderOptions::default() },
             gaussians: Gaussians::default(),
             picture: Rendered::default(),
+            shown: Shown::default(),
             of_picture: PictureGradient::default(),
             gradients: Gradients::default(),
         }
@@ -68,13 +70,13 @@ impl<'a> Work<'a> {
     ) -> Result<f64> {
         let Self { views, targets, clones, options, optimizer, radius_m, renderer, render, .. } = self;
         let (gaussians, gradients) = (&mut self.gaussians, &mut self.gradients);
-        let (picture, of_picture) = (&mut self.picture, &mut self.of_picture);
+        let (picture, shown, of_picture) = (&mut self.picture, &mut self.shown, &mut self.of_picture);
         let State { parameters, exposure } = state;
         context.parallel(|| {
             tie::made(parameters, clones, gaussians);
             let mut loss = Loss::default();
             let of_loss = |picture: &Rendered, of_picture: &mut PictureGradient| {
-                loss = targets[view].loss(picture, exposure.factor(view), options, Some(of_picture));
+                loss = targets[view].loss(picture, exposure.factor(view), options, shown, of_picture)?;
                 Ok(())
             };
             let camera = &views[view].camera;
@@ -123,7 +125,7 @@ impl<'a> Work<'a> {
         let camera = &self.views[view].camera;
         self.renderer.render_into(&self.gaussians, camera, &self.render, &mut self.picture)?;
         let factor = state.exposure.factor(view);
-        Ok(self.targets[view].loss(&self.picture, factor, self.options, None).psnr_db())
+        Ok(self.targets[view].psnr_db(&self.picture, factor, &mut self.shown))
     }
 
     /// The Gaussians of a state: originals, then clones.
