@@ -1,8 +1,8 @@
 //! Blending backwards: one tile's tape, from the farthest layer to the nearest.
 //!
-//! Every output of a pixel is a sum over its layers, `sum_k T_k alpha_k f_k + T_end f_end`, with f the colour, z, or
-//! 1. Weighted by the picture's gradient they are one sum of `phi_k = gc . c_k + gd z_k` with
-//! `phi_end = gc . background - ga`, so with what is behind composited from the back,
+//! Every output of a pixel is a sum over its layers, `sum_k T_k alpha_k f_k + T_end f_end`, with f the colour, z or 1.
+//! Weighted by the picture's gradient (gc, ga, gd) they are one sum, of `phi_k = gc . c_k + gd z_k` before
+//! `phi_end = gc . background - ga`. With S_k what is seen of it from layer k on, composited from the back,
 //!
 //! ```text
 //! S_k = alpha_k phi_k + (1 - alpha_k) S_{k+1},   S_end = phi_end
