@@ -51,7 +51,7 @@ pub struct Refinement {
     pub kept: u32,
     /// Why it ended.
     pub stop: Stop,
-    /// Mean loss of the first and of the last round over the views.
+    /// Loss of the first step, and the mean of the last round over the views.
     pub loss: [f64; 2],
     /// Mean PSNR of the views that took part, each in its exposure, before and after, dB.
     pub psnr_db: [f64; 2],
@@ -74,8 +74,8 @@ pub struct HeldOut {
 const LOOKS: u32 = 20;
 /// So many looks in a row may be worse than the best.
 const PATIENCE: u32 = 4;
-/// A mean loss this many times that of the first round never comes back.
-const DIVERGED: f64 = 2.0;
+/// A mean loss this many times the first never comes back.
+const DIVERGED: f64 = 3.0;
 /// Rounds over the views that tell how long a step takes, at the full step size.
 const TIMED_ROUNDS: u32 = 2;
 /// Step sizes at the end, as a share of those at the beginning.
@@ -141,7 +141,7 @@ pub(crate) fn refine(
         } else {
             looks_in_vain += 1;
         }
-        if course.last > DIVERGED * course.first() {
+        if course.has_diverged() {
             stop = Stop::Diverged;
             break;
         }
@@ -162,7 +162,7 @@ pub(crate) fn refine(
         made,
         kept: best.step,
         stop,
-        loss: [course.first(), course.last],
+        loss: [course.first.unwrap_or_default(), course.last],
         psnr_db: [shown_mean(&before), shown_mean(&after)],
         held_out: held_out.map(|v| HeldOut { view: views[v].name.clone(), psnr_db: [before[v], after[v]] }),
         exposures: (0..views.len()).map(|v| best.state.exposure.factor(v)).collect(),
@@ -200,7 +200,7 @@ struct Best {
     state: State,
 }
 
-/// Mean losses of the first and of the last round.
+/// The first loss, and the mean of the last round.
 #[derive(Debug, Default)]
 struct Course {
     recent: VecDeque<f64>,
@@ -210,18 +210,15 @@ struct Course {
 
 impl Course {
     fn push(&mut self, loss: f64, round: u32) {
+        self.first.get_or_insert(loss);
         self.recent.push_back(loss);
         if self.recent.len() > round as usize {
             self.recent.pop_front();
         }
         self.last = self.recent.iter().sum::<f64>() / self.recent.len() as f64;
-        if self.recent.len() == round as usize {
-            self.first.get_or_insert(self.last);
-        }
     }
 
-    /// Of steps fewer than a round, their mean.
-    fn first(&self) -> f64 {
-        self.first.unwrap_or(self.last)
+    fn has_diverged(&self) -> bool {
+        self.first.is_some_and(|first| self.last > DIVERGED * first)
     }
 }

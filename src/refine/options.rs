@@ -50,7 +50,7 @@ impl Default for RefineOptions {
             },
             ssim: 0.2,
             silhouette: 0.5,
-            depth: 0.1,
+            depth: 0.05,
             exposure: true,
             hold_out: false,
         }
