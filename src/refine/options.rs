@@ -40,7 +40,7 @@ impl Default for RefineOptions {
         Self {
             amount: Amount::Iterations(300),
             rates: Rates {
-                means: 3e-4,
+                means: 6e-4,
                 rotations: 1e-3,
                 scales: 5e-3,
                 opacities: 2.5e-2,
@@ -50,7 +50,7 @@ impl Default for RefineOptions {
             },
             ssim: 0.2,
             silhouette: 0.5,
-            depth: 0.05,
+            depth: 0.2,
             exposure: true,
             hold_out: false,
         }
