@@ -55,6 +55,11 @@
  *            handlers, the locale, standard output or standard error. Callbacks come on the calling thread. After
  *            fork, the child must not use a context of the parent.
  *
+ * Networks.  vg_model_open loads ONNX Runtime, a shared library, when the first model is opened and not before; it
+ *            stays loaded until the process ends, and libvg must then not be unloaded either. A vg_model is a
+ *            handle like the others; its threads are the runtime's own. After fork, the child must not use a model
+ *            of the parent.
+ *
  * Errors.    Functions that can fail return a vg_status and, through out_error, an object with a message: which
  *            argument, what was found, what is allowed. On failure, out handles are NULL, and everything the caller
  *            owns is as it was. out_error may be NULL. A bug in the library is a status too; it neither aborts nor
@@ -63,7 +68,8 @@
  * Same bytes. The same input and the same options give the same bytes, with any number of threads, on the same
  *            processor family; other processors differ in the last bits. Times and memory in the report differ. What
  *            a budget leaves out depends on how fast the machine is; the report's settings, without the budget,
- *            give the same bytes again.
+ *            give the same bytes again. With a vg_model this holds on one machine, with one ONNX Runtime
+ *            and the same model options.
  *
  * Versions.  Functions, enumerators and fields are added and never change. A struct that may grow begins with
  *            struct_size: call its _init function with sizeof, then set what you need. An older program's shorter
@@ -253,6 +259,60 @@ typedef int32_t vg_camera_model;
 #endif // __cplusplus
 
 /**
+ * Where a model runs.
+ */
+enum vg_provider
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * The processor.
+     */
+    VG_PROVIDER_CPU = 0,
+    /**
+     * The first CUDA device, where ONNX Runtime was built for it.
+     */
+    VG_PROVIDER_CUDA = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_provider vg_provider;
+#else
+typedef int32_t vg_provider;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Whether a model's weights are rearranged for speed when it is opened, which can take as much memory again.
+ */
+enum vg_prepack
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Where its files take less than 1 GiB.
+     */
+    VG_PREPACK_AUTO = 0,
+    /**
+     * Whatever their size.
+     */
+    VG_PREPACK_ALWAYS = 1,
+    /**
+     * They stay as they are.
+     */
+    VG_PREPACK_NEVER = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_prepack vg_prepack;
+#else
+typedef int32_t vg_prepack;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * Where metric depth comes from.
  */
 enum vg_prior
@@ -273,7 +333,7 @@ enum vg_prior
      */
     VG_PRIOR_HULL = 2,
     /**
-     * A network run by ONNX Runtime. `VG_STATUS_NOT_BUILT` in a build without it.
+     * The network of `vg_options.prior_model`. `VG_STATUS_NOT_BUILT` in a build without networks.
      */
     VG_PRIOR_ONNX = 3,
     /**
@@ -595,6 +655,14 @@ typedef struct vg_error vg_error;
 typedef struct vg_gaussians vg_gaussians;
 
 /**
+ * An open ONNX model; `vg_options.prior_model` and `vg_options.head_model` lend it to calls. Any number of threads
+ * may use one model at a time, each with a context of its own or all with one; runs of the same model take turns. It
+ * holds its weights and the threads of its options until it is freed. Free it with `vg_model_free`, after the last
+ * call that uses it has returned; Gaussians and reports do not need it any more.
+ */
+typedef struct vg_model vg_model;
+
+/**
  * What a reconstruction did, how long it took, what it left out, and the error it can know. Owned by the caller,
  * who frees it with `vg_report_free`; it never changes.
  */
@@ -727,6 +795,46 @@ typedef struct vg_view {
 } vg_view;
 
 /**
+ * How a model is opened.
+ */
+typedef struct vg_model_options {
+    /**
+     * `sizeof(vg_model_options)`.
+     */
+    size_t struct_size;
+    /**
+     * Path of ONNX Runtime, the library or its folder. NULL: what the environment variable `VG_ONNXRUNTIME` names,
+     * else the one inside an installed Python package `onnxruntime`. A process has one: the first that was loaded,
+     * which stays until the process ends. Default NULL.
+     */
+    const char *runtime;
+    /**
+     * A `vg_provider`. Default `VG_PROVIDER_CPU`.
+     */
+    int32_t provider;
+    /**
+     * 1: the processor steps in where the provider cannot be had; 0: that is `VG_STATUS_MISSING`. Default 0.
+     */
+    int32_t fall_back;
+    /**
+     * Threads of the runtime's own, held as long as the model is open, 1 to 1024; 0: one per core. Default 0.
+     */
+    uint32_t threads;
+    /**
+     * A `vg_prepack`. Default `VG_PREPACK_AUTO`.
+     */
+    int32_t prepack;
+    /**
+     * 1: the runtime keeps the memory of a run for the next one; 0: it gives it back. Default 0.
+     */
+    int32_t arena;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t flags;
+} vg_model_options;
+
+/**
  * Called on the calling thread at every stage boundary and inside long stages: the stage's name, how much of it is
  * done, 0 to 1, and the caller's pointer. Returns 0 to go on; anything else ends the call with
  * `VG_STATUS_CANCELLED`. May call the library; may not throw or jump out.
@@ -841,6 +949,14 @@ typedef struct vg_options {
      * fewer. Default 0.
      */
     size_t max_views;
+    /**
+     * The network that tells depth, for `VG_PRIOR_ONNX` and no other prior. Default NULL: none.
+     */
+    const struct vg_model *prior_model;
+    /**
+     * The network that makes Gaussians of pixels. Default NULL: none; each pixel becomes a disc on the surface.
+     */
+    const struct vg_model *head_model;
 } vg_options;
 
 /**
@@ -1096,6 +1212,24 @@ typedef struct vg_image_target {
      */
     uint32_t flags;
 } vg_image_target;
+
+/**
+ * Settings of `vg_segment`.
+ */
+typedef struct vg_segment_options {
+    /**
+     * `sizeof(vg_segment_options)`.
+     */
+    size_t struct_size;
+    /**
+     * Threads to use. NULL: made for this call, one per core; make one where pictures follow each other.
+     */
+    struct vg_context *context;
+    /**
+     * Reserved: 0.
+     */
+    uint64_t flags;
+} vg_segment_options;
 
 /**
  * What of a scene is wanted, and what its files do not say.
@@ -1362,6 +1496,37 @@ vg_status vg_view_init(struct vg_view *view,
  * Sets `*options` to the default values. `size`: `sizeof *options`.
  */
 VG_API
+vg_status vg_model_options_init(struct vg_model_options *options,
+                                size_t size);
+
+/**
+ * Opens the model in an ONNX file; weights in files beside it are found by their names. What it takes and gives is
+ * checked by the call that it is lent to.
+ *
+ * - path: the file; not NULL.
+ * - options: NULL for the default values.
+ * - out: receives the model; the caller frees it. NULL on failure.
+ * - out_error: NULL, or receives the error.
+ *
+ * `VG_STATUS_NOT_BUILT` in a build without networks, `VG_STATUS_MISSING` without ONNX Runtime or the provider,
+ * `VG_STATUS_FORMAT` where the runtime refuses the file.
+ */
+VG_API
+vg_status vg_model_open(const char *path,
+                        const struct vg_model_options *options,
+                        struct vg_model **out,
+                        struct vg_error **out_error);
+
+/**
+ * Closes a model and frees its memory and threads. No call may be using it. NULL: nothing happens.
+ */
+VG_API
+void vg_model_free(struct vg_model *model);
+
+/**
+ * Sets `*options` to the default values. `size`: `sizeof *options`.
+ */
+VG_API
 vg_status vg_options_init(struct vg_options *options,
                           size_t size);
 
@@ -1600,6 +1765,40 @@ vg_status vg_render(const struct vg_gaussians *gaussians,
                     const struct vg_render_options *options,
                     const struct vg_image_target *target,
                     struct vg_error **out_error);
+
+/**
+ * Sets `*options` to the default values. `size`: `sizeof *options`.
+ */
+VG_API
+vg_status vg_segment_options_init(struct vg_segment_options *options,
+                                  size_t size);
+
+/**
+ * Makes the mask of a photograph that has none. The network tells which pixels show a vehicle, the camera which of
+ * them is the one that stands at the origin of its vehicle frame: cars beside it and behind it are not in the mask.
+ * All 0 where the network sees none there.
+ *
+ * - model: a segmentation network; not NULL.
+ * - image: RGB8, BGR8, RGBA8, BGRA8 or GRAY8; alpha is not looked at. Not NULL.
+ * - camera: of the image; not NULL.
+ * - options: NULL for the default values.
+ * - out_mask: one byte per pixel of the image, the top row first: 255 is the vehicle, 0 everything else and what a
+ *   network that cuts off the sides was not shown. Ready to be the GRAY8 mask of a `vg_view`. Not NULL; written on
+ *   success only.
+ * - row_stride: bytes from one row of `out_mask` to the next; 0: rows without gaps. What lies between rows is not
+ *   touched.
+ * - out_error: NULL, or receives the error.
+ *
+ * `VG_STATUS_NOT_BUILT` in a build without networks.
+ */
+VG_API
+vg_status vg_segment(const struct vg_model *model,
+                     const struct vg_image *image,
+                     const struct vg_camera *camera,
+                     const struct vg_segment_options *options,
+                     uint8_t *out_mask,
+                     size_t row_stride,
+                     struct vg_error **out_error);
 
 /**
  * Sets `*options` to the default values. `size`: `sizeof *options`.

@@ -20,12 +20,12 @@
  *            Nothing here throws or needs exceptions or run-time type information; std::vector and
  *            std::string may throw std::bad_alloc where exceptions are on.
  *
- * Ownership. Context, Scene, Gaussians and Report own one handle and are moved, not copied. One that was
+ * Ownership. Context, Model, Scene, Gaussians and Report own one handle and are moved, not copied. One that was
  *            moved away is empty: no views, no Gaussians, and an error where it is used. A vg_view, a
  *            vg_image and a Span own nothing: they point into a Scene, a cv::Mat or Gaussians, which must
  *            outlive them.
  *
- * Options.   Options, RenderOptions, SceneOptions are the structs of vg.h with their default values set.
+ * Options.   Options, ModelOptions, SegmentOptions, RenderOptions, SceneOptions are the structs of vg.h with their default values set.
  *            Their fields are explained there.
  *
  * Callbacks. on_progress and on_log take any callable. They come on the calling thread, one at a time. An
@@ -193,6 +193,7 @@ template <class Owner, class Call> Result<Owner> made(Call call) {
 
 struct Free {
     void operator()(vg_context *handle) const noexcept { vg_context_free(handle); }
+    void operator()(vg_model *handle) const noexcept { vg_model_free(handle); }
     void operator()(vg_gaussians *handle) const noexcept { vg_gaussians_free(handle); }
     void operator()(vg_report *handle) const noexcept { vg_report_free(handle); }
     void operator()(vg_scene *handle) const noexcept { vg_scene_free(handle); }
@@ -594,6 +595,67 @@ class Gaussians {
     std::unique_ptr<vg_gaussians, detail::Free> handle_;
 };
 
+// ---- Networks
+
+/// How a model is opened.
+struct ModelOptions : vg_model_options {
+    /// ONNX Runtime, the library or its folder; empty: see `runtime`. Used instead of `runtime`.
+    std::string runtime_path;
+
+    ModelOptions() noexcept : vg_model_options{} { vg_model_options_init(this, sizeof(vg_model_options)); }
+};
+
+/// An open ONNX model, for `Options::lend_prior` and `Options::lend_head`. It must outlive the calls that use it;
+/// any number of threads may use it at a time.
+class Model {
+  public:
+    using Handle = vg_model;
+
+    Model() noexcept = default;
+    explicit Model(vg_model *owned) noexcept : handle_(owned) {}
+
+    /// The model in an ONNX file.
+    static Result<Model> open(const std::string &path, const ModelOptions &options = {}) {
+        vg_model_options c_options = options;
+        if (!options.runtime_path.empty()) {
+            c_options.runtime = options.runtime_path.c_str();
+        }
+        return detail::made<Model>([&](vg_model **out, vg_error **error) {
+            return vg_model_open(path.c_str(), &c_options, out, error);
+        });
+    }
+
+    const vg_model *get() const noexcept { return handle_.get(); }
+    /// The handle, now the caller's to free.
+    vg_model *release() noexcept { return handle_.release(); }
+
+  private:
+    std::unique_ptr<vg_model, detail::Free> handle_;
+};
+
+/// Settings of a mask.
+struct SegmentOptions : vg_segment_options {
+    SegmentOptions() noexcept : vg_segment_options{} {
+        vg_segment_options_init(this, sizeof(vg_segment_options));
+    }
+};
+
+/// The mask of a photograph that has none, by a segmentation network: one byte per pixel, rows without gaps, 255
+/// where the vehicle is that stands at the origin of the camera's vehicle frame.
+inline Result<std::vector<std::uint8_t>> segment(const Model &model, const vg_image &photograph,
+                                                 const vg_camera &camera, const SegmentOptions &options = {}) {
+    // A picture of no sensible size is the library's to refuse, before memory is asked for.
+    const bool sensible = photograph.width <= 8192 && photograph.height <= 8192;
+    std::vector<std::uint8_t> mask(sensible ? std::size_t{photograph.width} * photograph.height : 0);
+    const Result<void> made = detail::done([&](vg_error **error) {
+        return vg_segment(model.get(), &photograph, &camera, &options, mask.data(), 0, error);
+    });
+    if (!made) {
+        return made.error();
+    }
+    return mask;
+}
+
 // ---- Reconstruction
 
 /// Settings of a reconstruction.
@@ -612,6 +674,17 @@ struct Options : vg_options {
         cloud_count = measured.size();
     }
     void lend_cloud(const std::vector<std::array<float, 3>> &&) = delete;
+
+    /// Depth from a network: lent, and needed until the call returns. A temporary is refused.
+    void lend_prior(const Model &model) noexcept {
+        prior = VG_PRIOR_ONNX;
+        prior_model = model.get();
+    }
+    void lend_prior(const Model &&) = delete;
+
+    /// Gaussians from a network: lent, and needed until the call returns. A temporary is refused.
+    void lend_head(const Model &model) noexcept { head_model = model.get(); }
+    void lend_head(const Model &&) = delete;
 };
 
 /// What a reconstruction did.
@@ -822,6 +895,23 @@ inline Result<vg_image> image(LentMat mat) {
 inline Result<vg_image> image_rgb(LentMat mat) {
     static constexpr detail::MatFormat formats[] = {{CV_8UC3, VG_FORMAT_RGB8}, {CV_8UC4, VG_FORMAT_RGBA8}};
     return detail::lent("image", mat.get(), formats, "CV_8UC3 (RGB), CV_8UC4 (RGBA)");
+}
+
+/// The mask of a photograph that has none, CV_8UC1, by a segmentation network.
+inline Result<cv::Mat> segment(const Model &model, LentMat photograph, const vg_camera &camera,
+                               const SegmentOptions &options = {}) {
+    const Result<vg_image> pixels = image(photograph);
+    if (!pixels) {
+        return pixels.error();
+    }
+    cv::Mat mask(photograph.get().rows, photograph.get().cols, CV_8UC1);
+    const Result<void> made = detail::done([&](vg_error **error) {
+        return vg_segment(model.get(), &*pixels, &camera, &options, mask.data, mask.step, error);
+    });
+    if (!made) {
+        return made.error();
+    }
+    return mask;
 }
 
 /// A mask: 128 and above is vehicle.

@@ -3,6 +3,8 @@
 A wheel holds two faces of one library: the extension module ``_native``, and ``lib/libvg.so`` with ``include/vg.h``
 for ctypes and for C. ``python build_backend.py`` alone prepares a checkout for ``maturin develop``.
 
+``pip install ./bindings/python --config-settings features=onnx`` builds both with networks.
+
 There is no source distribution: the sources are those of the repository that this folder is a part of.
 """
 
@@ -21,12 +23,34 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 PACKAGE = HERE / "python" / "vehicle_gaussians"
 LICENCES = ("LICENSE-MIT", "LICENSE-APACHE")
+#: What can be built in beside what is always there.
+FEATURES = ("onnx",)
 
 
-def prepare() -> None:
+def features_of(config_settings: Any) -> list[str]:
+    """The features that the caller of pip asked for, separated by commas."""
+    wanted = [name for name in ((config_settings or {}).get("features") or "").split(",") if name]
+    for name in wanted:
+        if name not in FEATURES:
+            sys.exit(f"vehicle-gaussians: features: {name!r}; allowed: {', '.join(FEATURES)}")
+    return wanted
+
+
+def for_maturin(config_settings: Any) -> Any:
+    """The settings in maturin's words."""
+    features = features_of(config_settings)
+    if not features:
+        return config_settings
+    others = {name: value for name, value in config_settings.items() if name != "features"}
+    if "build-args" in others:
+        sys.exit("vehicle-gaussians: build-args beside features; allowed: one of them")
+    return {**others, "build-args": "--features " + ",".join(features)}
+
+
+def prepare(config_settings: Any = None) -> None:
     """Puts the shared library, the header and the licences where maturin takes them from."""
     check_checkout()
-    library = build_library()
+    library = build_library(features_of(config_settings))
     fill(PACKAGE / "lib", [library])
     fill(PACKAGE / "include", [ROOT / "include" / "vg.h"])
 
@@ -45,13 +69,17 @@ def check_checkout() -> None:
         shutil.copyfile(ROOT / licence, HERE / licence)
 
 
-def build_library() -> Path:
+def build_library(features: list[str]) -> Path:
     """The shared library with the C functions, built with the dependencies and settings of the extension module."""
     cargo = shutil.which("cargo")
     if cargo is None:
         sys.exit("vehicle-gaussians: cargo is not on PATH: install Rust 1.89 or newer")
     command = [cargo, "build", "--release", "--locked", "--package", "vehicle-gaussians", "--lib"]
-    command += ["--manifest-path", str(HERE / "Cargo.toml"), "--message-format", "json-render-diagnostics"]
+    # Features can only be asked of the library's own workspace; its lock file holds the same versions.
+    manifest = ROOT / "Cargo.toml" if features else HERE / "Cargo.toml"
+    if features:
+        command += ["--no-default-features", "--features", ",".join(features)]
+    command += ["--manifest-path", str(manifest), "--message-format", "json-render-diagnostics"]
     print("Running `" + " ".join(command) + "`", flush=True)
     built = subprocess.run(command, stdout=subprocess.PIPE, check=False, text=True)
     if built.returncode != 0:
@@ -79,13 +107,13 @@ def maturin() -> Any:
 
 
 def build_wheel(wheel_directory: str, config_settings: Any = None, metadata_directory: str | None = None) -> str:
-    prepare()
-    return str(maturin().build_wheel(wheel_directory, config_settings, metadata_directory))
+    prepare(config_settings)
+    return str(maturin().build_wheel(wheel_directory, for_maturin(config_settings), metadata_directory))
 
 
 def build_editable(wheel_directory: str, config_settings: Any = None, metadata_directory: str | None = None) -> str:
-    prepare()
-    return str(maturin().build_editable(wheel_directory, config_settings, metadata_directory))
+    prepare(config_settings)
+    return str(maturin().build_editable(wheel_directory, for_maturin(config_settings), metadata_directory))
 
 
 def build_sdist(sdist_directory: str, config_settings: Any = None) -> str:
@@ -97,12 +125,12 @@ def build_sdist(sdist_directory: str, config_settings: Any = None) -> str:
 
 def prepare_metadata_for_build_wheel(metadata_directory: str, config_settings: Any = None) -> str:
     check_checkout()
-    return str(maturin().prepare_metadata_for_build_wheel(metadata_directory, config_settings))
+    return str(maturin().prepare_metadata_for_build_wheel(metadata_directory, for_maturin(config_settings)))
 
 
 def prepare_metadata_for_build_editable(metadata_directory: str, config_settings: Any = None) -> str:
     check_checkout()
-    return str(maturin().prepare_metadata_for_build_editable(metadata_directory, config_settings))
+    return str(maturin().prepare_metadata_for_build_editable(metadata_directory, for_maturin(config_settings)))
 
 
 def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:

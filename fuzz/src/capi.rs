@@ -245,7 +245,8 @@ fn field<S: Source>(world: &World, call: &mut Call, i: usize, source: &mut S) {
     let k = source.below(field.count);
     let put = |lent: &mut Lent, bits: u64| lent.put_in(element, &field.name, k, bits);
     match field.name.as_str() {
-        "struct_size" => {}
+        // Of models there are none, and what a path names must be loadable.
+        "struct_size" | "prior_model" | "head_model" | "runtime" => {}
         "context" => put(lent, source.pick(&[0, world.context as u64])),
         "progress" => put(lent, source.pick(&[0, on_progress as *const () as u64])),
         "log" => put(lent, source.pick(&[0, on_log as *const () as u64])),

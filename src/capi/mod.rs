@@ -29,6 +29,8 @@ mod camera;
 
 mod view;
 
+mod model;
+
 mod options;
 
 mod report;
@@ -39,6 +41,8 @@ mod reconstruct;
 
 mod render;
 
+mod segment;
+
 mod scene;
 
 #[cfg(test)]
@@ -48,11 +52,13 @@ pub use camera::*;
 pub use context::*;
 pub use gaussians::*;
 pub use image::*;
+pub use model::*;
 pub use options::*;
 pub use reconstruct::*;
 pub use render::*;
 pub use report::*;
 pub use scene::*;
+pub use segment::*;
 pub use status::*;
 pub use version::*;
 pub use view::*;

@@ -2,6 +2,7 @@
 
 use super::context::vg_context;
 use super::guard::guarded;
+use super::model::{self, vg_model};
 use super::read::{self, Versioned};
 use super::status::{c_string, one_line, vg_status};
 use crate::error::{Error, Result};
@@ -22,7 +23,7 @@ pub enum vg_prior {
     Given = 1,
     /// The hull of the silhouettes and their mirrored twins; needs masks and nothing else.
     Hull = 2,
-    /// A network run by ONNX Runtime. `VG_STATUS_NOT_BUILT` in a build without it.
+    /// The network of `vg_options.prior_model`. `VG_STATUS_NOT_BUILT` in a build without networks.
     Onnx = 3,
     /// The hull, corrected by what vehicles look like; needs masks and nothing else.
     Shape = 4,
@@ -155,6 +156,10 @@ pub struct vg_options {
     /// At most this many views are used, those that spread best around the vehicle; 0: all. A `budget_s` may choose
     /// fewer. Default 0.
     pub max_views: usize,
+    /// The network that tells depth, for `VG_PRIOR_ONNX` and no other prior. Default NULL: none.
+    pub prior_model: *const vg_model,
+    /// The network that makes Gaussians of pixels. Default NULL: none; each pixel becomes a disc on the surface.
+    pub head_model: *const vg_model,
 }
 
 unsafe impl Versioned for vg_options {
@@ -185,24 +190,21 @@ unsafe impl Versioned for vg_options {
             cloud_count: 0,
             resolution: 1.0,
             max_views: 0,
+            prior_model: std::ptr::null(),
+            head_model: std::ptr::null(),
         }
     }
 }
 
 impl vg_options {
-    pub(super) fn to_options(self) -> Result<Options> {
+    pub(super) unsafe fn to_options(self) -> Result<Options> {
         let priors = [
-            (vg_prior::Auto as i32, "auto", Some(PriorChoice::Auto)),
-            (vg_prior::Given as i32, "given", Some(PriorChoice::Given)),
-            (vg_prior::Hull as i32, "hull", Some(PriorChoice::Hull)),
-            (vg_prior::Onnx as i32, "onnx", None),
-            (vg_prior::Shape as i32, "shape", Some(PriorChoice::Shape)),
+            (vg_prior::Auto as i32, "auto", PriorChoice::Auto),
+            (vg_prior::Given as i32, "given", PriorChoice::Given),
+            (vg_prior::Hull as i32, "hull", PriorChoice::Hull),
+            (vg_prior::Onnx as i32, "onnx", PriorChoice::Onnx),
+            (vg_prior::Shape as i32, "shape", PriorChoice::Shape),
         ];
-        let prior = read::choice("options.prior", self.prior, &priors)?.ok_or_else(|| Error::NotBuilt {
-            argument: "options.prior".into(),
-            found: "onnx".into(),
-            remedy: "this version has auto, given, hull and shape".into(),
-        })?;
         let symmetries = [
             (vg_symmetry::Auto as i32, "auto", SymmetryMode::Auto),
             (vg_symmetry::Always as i32, "always", SymmetryMode::Always),
@@ -220,9 +222,9 @@ impl vg_options {
         read::zero("options.flags", self.flags == 0)?;
         let unknown_size = self.vehicle_size == [0.0; 3];
         Ok(Options {
-            prior,
-            prior_model: None,
-            head_model: None,
+            prior: read::choice("options.prior", self.prior, &priors)?,
+            prior_model: unsafe { model::lent(self.prior_model) },
+            head_model: unsafe { model::lent(self.head_model) },
             symmetry: read::choice("options.symmetry", self.symmetry, &symmetries)?,
             vehicle_size: (!unknown_size).then_some(self.vehicle_size),
             sh_degree: sh_degree("options.sh_degree", self.sh_degree)?,

@@ -22,9 +22,11 @@ pub(super) struct ReportObject {
 }
 
 impl ReportObject {
-    pub(super) fn new(report: Report, points: Option<PointCloud>) -> Self {
+    pub(super) fn new(mut report: Report, points: Option<PointCloud>) -> Self {
         let json = serde_json::to_string_pretty(&report)
             .unwrap_or_else(|e| format!("{{\"error\": {:?}}}", e.to_string()));
+        // The text has their paths; a report that is kept must not keep a network's memory.
+        (report.settings.prior_model, report.settings.head_model) = (None, None);
         Self { report, json: c_string(json), points: points.unwrap_or_default() }
     }
 
@@ -149,6 +151,7 @@ impl vg_report_figures {
         let prior = match report.prior {
             "given" => vg_prior::Given,
             "hull" => vg_prior::Hull,
+            "onnx" => vg_prior::Onnx,
             "shape" => vg_prior::Shape,
             _ => vg_prior::Auto,
         };

@@ -45,10 +45,11 @@ fn layout_of_rust() -> String {
         vg_image_target {
             struct_size width height color color_row_stride depth depth_row_stride color_format flags
         }
+        vg_model_options { struct_size runtime provider fall_back threads prepack arena flags }
         vg_options {
             struct_size context prior symmetry sh_degree keep check points vehicle_size progress progress_user log
             log_user calibrate relight photo flags budget_s cloud cloud_count resolution
-            max_views
+            max_views prior_model head_model
         }
         vg_render_options {
             struct_size context backend background background_color alpha depth_mode sh_degree antialiased blur
@@ -63,6 +64,7 @@ fn layout_of_rust() -> String {
         vg_scene_options {
             struct_size context vehicle_from_world names name_count depth_scale load_depth flags log log_user
         }
+        vg_segment_options { struct_size context flags }
         vg_view { struct_size name camera image mask depth }
     }
     lines
@@ -102,7 +104,9 @@ fn numbers_of_rust() -> BTreeSet<String> {
         vg_format { Rgb8 Bgr8 Rgba8 Bgra8 Gray8 Rgba32f Depth32f }
         vg_keep { DuplicateViews Overlap SilhouetteEdge Floaters ShBands }
         vg_log_level { Warning Info Debug }
+        vg_prepack { Auto Always Never }
         vg_prior { Auto Given Hull Onnx Shape }
+        vg_provider { Cpu Cuda }
         vg_relight { Auto Never }
         vg_status { Ok Argument Format Io Reconstruction Cancelled NotBuilt Internal Missing }
         vg_symmetry { Auto Always Never Flip }
@@ -124,13 +128,21 @@ fn vg_abi_witness(
     _: &vg_context_options,
     _: &vg_gaussian_arrays,
     _: &vg_image_target,
+    _: &vg_model_options,
     _: &vg_options,
 ) {
 }
 
 /// The rest: a function of the witness takes few arguments.
 #[safer_ffi::ffi_export]
-fn vg_abi_witness_more(_: &vg_render_options, _: &vg_report_figures, _: &vg_scene_options, _: &vg_view) {}
+fn vg_abi_witness_more(
+    _: &vg_render_options,
+    _: &vg_report_figures,
+    _: &vg_scene_options,
+    _: &vg_segment_options,
+    _: &vg_view,
+) {
+}
 
 /// safer-ffi derives each struct's C form from the compiled type, by traits that only FFI-safe types have; cbindgen
 /// reads the source text. Neither knows of the other.
@@ -193,6 +205,9 @@ fn every_function() -> Vec<(&'static str, Call)> {
         vg_pose_from_opengl(null(), null(), null_mut()) reports;
         vg_pose_from_box(null(), null(), null_mut()) reports;
         vg_view_init(null_mut(), 0) status;
+        vg_model_options_init(null_mut(), 0) status;
+        vg_model_open(null(), null(), null_mut()) reports;
+        vg_model_free(null_mut()) none;
         vg_options_init(null_mut(), 0) status;
         vg_report_figures_init(null_mut(), 0) status;
         vg_report_get_figures(null(), null_mut()) reports;
@@ -220,6 +235,8 @@ fn every_function() -> Vec<(&'static str, Call)> {
         vg_render_options_init(null_mut(), 0) status;
         vg_image_target_init(null_mut(), 0) status;
         vg_render(null(), null(), null(), null()) reports;
+        vg_segment_options_init(null_mut(), 0) status;
+        vg_segment(null(), null(), null(), null(), null_mut(), 0) reports;
         vg_scene_options_init(null_mut(), 0) status;
         vg_colmap_open(null(), null(), null_mut()) reports;
         vg_transforms_open(null(), null(), null_mut()) reports;

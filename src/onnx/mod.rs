@@ -63,6 +63,37 @@ impl Default for ModelOptions {
     }
 }
 
+/// Most threads that the runtime is asked for.
+const MAX_THREADS: usize = 1024;
+
+impl ModelOptions {
+    /// Each field in its range.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] with the field's name.
+    pub fn validate(&self) -> Result<()> {
+        if self.threads > MAX_THREADS {
+            let allowed = format!("0 to {MAX_THREADS}, 0 for one per core");
+            return Err(Error::argument("threads", self.threads.to_string(), allowed));
+        }
+        Ok(())
+    }
+}
+
+/// Whether this build can open models: it was made with the feature `onnx`.
+pub const fn is_built() -> bool {
+    cfg!(feature = "onnx")
+}
+
+/// What a build without networks answers to whoever asks for one in `argument`.
+pub(crate) fn not_built(argument: &str) -> Error {
+    Error::NotBuilt {
+        argument: argument.into(),
+        found: "ONNX Runtime".into(),
+        remedy: "build with the feature onnx (cargo build --features onnx)".into(),
+    }
+}
+
 /// An open model. Clones share it; threads take turns.
 #[derive(Clone)]
 pub struct Model {
@@ -99,10 +130,14 @@ impl Model {
     /// Opens the model in a file; weights in files beside it are found by their names.
     ///
     /// # Errors
-    /// [`Error::NotBuilt`] without the feature `onnx`, [`Error::Io`] without the file, [`Error::Missing`] without a
-    /// runtime or the provider, [`Error::Format`] where the runtime refuses the file.
+    /// [`Error::Argument`] for options out of range, [`Error::NotBuilt`] without the feature `onnx`, [`Error::Io`]
+    /// without the file, [`Error::Missing`] without a runtime or the provider, [`Error::Format`] where the runtime
+    /// refuses the file.
     pub fn open(path: &Path, options: &ModelOptions) -> Result<Self> {
-        backend::is_built()?;
+        options.validate()?;
+        if !is_built() {
+            return Err(not_built("model"));
+        }
         let file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
         if !file.metadata().is_ok_and(|m| m.is_file()) {
             return Err(Error::argument("model", format!("{}, no file", path.display()), "an ONNX file"));

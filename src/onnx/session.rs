@@ -14,10 +14,6 @@ const LARGE: u64 = 1 << 30;
 
 pub(super) struct Session(ort::session::Session);
 
-pub(super) fn is_built() -> Result<()> {
-    Ok(())
-}
-
 impl Session {
     pub(super) fn open(path: &Path, options: &ModelOptions) -> Result<(Self, Ports)> {
         runtime::load(options.runtime.as_deref())?;

@@ -1,7 +1,7 @@
 //! What a caller may choose; `Options::default()` is what everything is measured with.
 
 use crate::error::{Error, Result};
-use crate::onnx::Model;
+use crate::onnx::{self, Model};
 use crate::relight::Relight;
 use crate::symmetry::SymmetryMode;
 use serde::{Deserialize, Serialize};
@@ -124,8 +124,13 @@ impl Default for Options {
 
 impl Options {
     /// Each field in its range.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] with the field's name; [`Error::NotBuilt`] for the `Onnx` prior in a build without networks.
     pub fn validate(&self) -> Result<()> {
         match (self.prior, &self.prior_model) {
+            // Nobody can open one there: the model is not what is missing.
+            (PriorChoice::Onnx, None) if !onnx::is_built() => return Err(onnx::not_built("options.prior")),
             (PriorChoice::Onnx, None) => {
                 return Err(Error::argument(
                     "options.prior_model",

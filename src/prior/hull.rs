@@ -84,7 +84,7 @@ impl HullPrior {
                 return Err(Error::argument(
                     format!("{}.mask", view.argument(i)),
                     if view.mask.is_some() { "no vehicle pixel" } else { "none" },
-                    "a mask with the vehicle: without depth there is nothing but silhouettes",
+                    "a mask with the vehicle, the caller's own or a segmentation network's (mask model): without depth there is nothing but silhouettes",
                 ));
             }
         }

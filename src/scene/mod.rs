@@ -2,10 +2,13 @@
 
 pub mod cloud;
 pub mod depth;
+pub(crate) mod fit;
+pub(crate) mod framing;
 pub mod image;
 pub mod mask;
 pub(crate) mod mirror;
 pub(crate) mod resize;
+pub mod segment;
 pub mod undistort;
 pub mod view;
 pub mod visibility;
@@ -14,4 +17,5 @@ pub use cloud::Cloud;
 pub use depth::DepthMap;
 pub use image::{PixelFormat, RgbImage};
 pub use mask::Mask;
+pub use segment::Segmenter;
 pub use view::{Scene, View};

@@ -141,7 +141,8 @@ impl Taps {
         [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y]
     }
 
-    fn blend(&self, [a, b, c, d]: [f32; 4]) -> f32 {
+    /// Between four values in the order of `index`.
+    pub(crate) fn blend(&self, [a, b, c, d]: [f32; 4]) -> f32 {
         let top = a + (b - a) * self.across;
         let bottom = c + (d - c) * self.across;
         top + (bottom - top) * self.down

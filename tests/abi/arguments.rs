@@ -78,7 +78,7 @@ impl Table {
         let function = make(&self.world).function;
         let found = format!("{function}, {what}: {:?} {}", done.status, done.message);
         let (status, words) = match expect {
-            Fine => (vg_status::Ok, String::new()),
+            Fine => (make(&self.world).good, String::new()),
             Expect::Refused(words) => (vg_status::Argument, words),
             Fails(status, words) => (status, words),
         };
@@ -195,7 +195,7 @@ fn expected(outcome: Outcome, words: String) -> Expect {
 const SIZED: [&str; 2] = ["vg_report_get_figures", "vg_scene_get_view"];
 
 /// Functions that cannot fail, all called by `what_cannot_fail_accepts_null`.
-const NEVER_FAIL: [&str; 22] = [
+const NEVER_FAIL: [&str; 23] = [
     "vg_version",
     "vg_abi_version",
     "vg_error_code",
@@ -218,6 +218,7 @@ const NEVER_FAIL: [&str; 22] = [
     "vg_gaussians_free",
     "vg_scene_view_count",
     "vg_scene_free",
+    "vg_model_free",
 ];
 
 #[test]
@@ -259,6 +260,7 @@ fn what_cannot_fail_accepts_null() {
         vg_report_free(null_mut());
         vg_gaussians_free(null_mut());
         vg_scene_free(null_mut());
+        vg_model_free(null_mut());
     }
 }
 
@@ -657,6 +659,35 @@ fn files_that_are_not_there_or_not_what_they_should_be_are_told_by_path() {
     }
     let file = folder.join("few.ply").join("deeper.ply");
     table.row(save, "a file for a folder", path(text(&file)), io("deeper.ply"));
+}
+
+#[test]
+fn photographs_without_masks_are_checked_before_the_network_is_asked_for() {
+    let mut table = Table::new();
+    let make = calls::segment;
+    let image = |change: fn(&mut vg_image)| {
+        move |call: &mut Call| {
+            let Value::Handle(at) = call.arguments[1].value else { panic!("a picture") };
+            let mut image = unsafe { std::ptr::with_exposed_provenance::<vg_image>(at).read_unaligned() };
+            change(&mut image);
+            let mut memory = Memory::of(&[image], 1);
+            call.set("image", Value::Handle(memory.pointer()));
+            call.inputs.push(memory);
+        }
+    };
+    table.row(make, "no pixels", image(|i| i.data = null()), refused("image.data"));
+    table.row(make, "depth", image(|i| i.format = vg_format::Depth32f as i32), refused("image.format: 7"));
+    table.row(make, "no format", image(|i| i.format = 0), refused("image.format: 0"));
+    table.row(make, "flags", image(|i| i.flags = 1), refused("image.flags"));
+    table.row(make, "no columns", image(|i| i.width = 0), refused("image: 0x36"));
+    table.row(make, "too many rows", image(|i| i.height = 8193), refused("image: 48x8193"));
+    table.row(make, "rows in one another", image(|i| i.row_stride = 143), refused("image.row_stride"));
+    let close = |call: &mut Call| call.set("row_stride", Value::Number(0));
+    // Nothing is written without a network, so the memory may be larger than rows without gaps.
+    table.row(make, "rows without gaps", close, Fine);
+    let words = if vg::onnx::is_built() { "model: NULL" } else { "build with the feature onnx" };
+    let status = calls::segment(&table.world).good;
+    table.row(make, "no model", |_| {}, Fails(status, words.into()));
 }
 
 /// A handle of no Gaussians.

@@ -4,18 +4,20 @@ use crate::tools::{STRICT, assert_golden, cc, cxx, have, root, run, scratch};
 use std::process::Command;
 
 /// The chapters of the header.
-const CHAPTERS: [&str; 12] = [
+const CHAPTERS: [&str; 14] = [
     "version",
     "status",
     "context",
     "image",
     "camera",
     "view",
+    "model",
     "options",
     "report",
     "gaussians",
     "reconstruct",
     "render",
+    "segment",
     "scene",
 ];
 

@@ -28,8 +28,8 @@ constexpr bool only_moves =
     std::is_nothrow_move_constructible_v<T> && std::is_nothrow_move_assignable_v<T> &&
     std::is_nothrow_default_constructible_v<T> && !std::is_copy_constructible_v<T> &&
     !std::is_copy_assignable_v<T>;
-static_assert(only_moves<vg::Context> && only_moves<vg::Scene> && only_moves<vg::Gaussians> &&
-              only_moves<vg::Report>);
+static_assert(only_moves<vg::Context> && only_moves<vg::Model> && only_moves<vg::Scene> &&
+              only_moves<vg::Gaussians> && only_moves<vg::Report>);
 static_assert(!std::is_convertible_v<vg::Result<int>, bool>, "a Result is a condition, not a number");
 static_assert(!std::is_convertible_v<vg_gaussians *, vg::Gaussians>, "taking a handle over is written down");
 
@@ -173,6 +173,38 @@ void a_cloud_is_lent() {
     CHECK(options.cloud == nullptr && options.cloud_count == 0);
 }
 
+/// A program that finds out whether its library has networks.
+void models_are_opened_and_lent() {
+    vg::ModelOptions settings;
+    CHECK(settings.runtime == nullptr && settings.provider == VG_PROVIDER_CPU && settings.threads == 0);
+    settings.runtime_path = "/nowhere/libonnxruntime.so";
+    const vg::Result<vg::Model> none = vg::Model::open("/nowhere/m.onnx", settings);
+    CHECK(!none);
+    const bool built = none.error().status == VG_STATUS_IO;
+    CHECK(built || none.error().status == VG_STATUS_NOT_BUILT);
+    CHECK(failed(vg::Model::open("/nowhere/m.onnx"), none.error().status, built ? "m.onnx" : "feature onnx"));
+    settings.threads = 1025;
+    CHECK(failed(vg::Model::open("/nowhere/m.onnx", settings), VG_STATUS_ARGUMENT, "options.threads: 1025"));
+
+    const Photographs photographs;
+    const vg::Model empty;
+    vg::Options options;
+    options.lend_head(empty);
+    CHECK(options.head_model == nullptr && options.prior == VG_PRIOR_AUTO);
+    options.lend_prior(empty);
+    CHECK(options.prior_model == nullptr && options.prior == VG_PRIOR_ONNX);
+    CHECK(failed(vg::reconstruct({photographs.view()}, options),
+                 built ? VG_STATUS_ARGUMENT : VG_STATUS_NOT_BUILT, "options.prior"));
+
+    const vg_view view = photographs.view();
+    CHECK(failed(vg::segment(empty, view.image, view.camera),
+                 built ? VG_STATUS_ARGUMENT : VG_STATUS_NOT_BUILT, "model"));
+    CHECK(failed(vg::segment(empty, vg_image{}, view.camera), VG_STATUS_ARGUMENT, "image.data"));
+    vg_image odd = view.image;
+    odd.width = 4000000000;
+    CHECK(failed(vg::segment(empty, odd, view.camera), VG_STATUS_ARGUMENT, "image: 4000000000"));
+}
+
 void callbacks_stop_a_reconstruction() {
     const Photographs photographs;
     int calls = 0;
@@ -274,6 +306,7 @@ int main(int argc, char **argv) {
     cameras_are_made_moved_scaled_and_cropped();
     callbacks_stop_a_reconstruction();
     a_cloud_is_lent();
+    models_are_opened_and_lent();
     errors_name_the_argument();
     const vg::Reconstruction made = ball();
     gaussians_are_saved_derived_and_made_of_arrays(made.gaussians, argv[1]);

@@ -100,6 +100,14 @@ void other_types_are_errors_that_name_them(const Mats &mats) {
     CHECK(failed(vg::image_rgb(mats.mask), VG_STATUS_ARGUMENT, "allowed: CV_8UC3 (RGB)"));
 }
 
+void photographs_without_masks_are_lent(const Mats &mats) {
+    const vg::Model none;
+    const vg_camera camera = camera_at_right();
+    // The library's words: the picture was taken, the network is what is missing.
+    CHECK(vg::segment(none, mats.bgr, camera).error().message.find("model: ") == 0);
+    CHECK(failed(vg::segment(none, mats.metres, camera), VG_STATUS_ARGUMENT, "CV_32FC1"));
+}
+
 void pictures_go_into_matrices(const vg::Gaussians &car) {
     const vg_camera camera = camera_at_right();
     const vg::Picture expected = vg::render(car, camera, {}, VG_FORMAT_BGR8).take();
@@ -165,6 +173,7 @@ int main() {
     const Mats mats;
     const vg::Gaussians car = the_same_bytes_in_every_layout(mats);
     other_types_are_errors_that_name_them(mats);
+    photographs_without_masks_are_lent(mats);
     pictures_go_into_matrices(car);
     calibrations_are_taken_as_opencv_leaves_them();
     return 0;

@@ -16,7 +16,7 @@ use vg::symmetry::SymmetryMode;
 use vg::{Camera, Error, Scene, View};
 
 /// Attributes that are the same at every pixel: 0 but for scale channels of `scale`.
-fn constant(multiple: &str, scale: f32) -> Graph {
+pub(crate) fn constant(multiple: &str, scale: f32) -> Graph {
     let mut g = Graph::default();
     g.inputs = vec![
         Port::new("images", &[None, Some(3), None, None]),

@@ -8,10 +8,12 @@ mod common;
 mod graph;
 mod oracle;
 
+mod c_abi;
 mod contract;
 mod depth;
 mod head;
 mod program;
+mod segment;
 
 use graph::Graph;
 use std::path::{Path, PathBuf};

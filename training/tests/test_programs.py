@@ -8,7 +8,7 @@ import pytest
 
 from conftest import PACKAGE, Program
 
-PROGRAMS = ["tiny", "mapanything", "depth_anything_3", "lpips"]
+PROGRAMS = ["tiny", "mapanything", "depth_anything_3", "lpips", "segmentation"]
 HEAVY = ("torch", "onnx", "onnxruntime", "onnxscript", "numpy", "torchvision", "mapanything", "lpips")
 
 
@@ -38,6 +38,7 @@ def test_help_needs_no_package(program: Program, name: str) -> None:
             "pip install omegaconf addict einops e3nn",
         ),
         ("lpips", "torchvision", "torchvision is not installed: pip install torchvision"),
+        ("segmentation", "torchvision", "torchvision is not installed: pip install torchvision"),
         ("contract", "onnx", "onnx is not installed: pip install onnx"),
     ],
 )

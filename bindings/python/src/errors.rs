@@ -42,6 +42,10 @@ pub(crate) fn from_library(py: Python<'_>, error: vg::Error) -> PyErr {
             let argument = argument.replace("rotations", "quats").replace("budget_s", "budget");
             format!("{}; allowed: {allowed}", [&argument, &*found].join(": "))
         }
+        vg::Error::NotBuilt { argument, found, remedy } => {
+            let argument = argument.strip_prefix("options.").unwrap_or(&argument).to_owned();
+            vg::Error::NotBuilt { argument, found, remedy }.to_string()
+        }
         other => other.to_string(),
     };
     vg_error(py, status, message)

@@ -9,6 +9,7 @@ mod arrays;
 mod camera;
 mod errors;
 mod gaussians;
+mod model;
 mod reconstruct;
 mod scene;
 
@@ -22,6 +23,8 @@ mod _native {
     use crate::errors::panic_on_a_worker_thread;
     #[pymodule_export]
     use crate::gaussians::Gaussians;
+    #[pymodule_export]
+    use crate::model::{Model, segment};
     #[pymodule_export]
     use crate::reconstruct::reconstruct;
     #[pymodule_export]

@@ -4,6 +4,7 @@ use crate::arrays::{array, owned, shape_text, values};
 use crate::camera::Camera;
 use crate::errors::{bad_type, bad_value, detached, from_library};
 use crate::gaussians::Gaussians;
+use crate::model::Model;
 use numpy::{PyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -24,8 +25,8 @@ type Points<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>);
 /// The Gaussians, the report as JSON, and the points if asked for.
 #[pyfunction]
 #[pyo3(signature = (
-    images, masks, cameras, depths, *, prior, calibrate, symmetry, relight, photo, cloud, vehicle_size, sh_degree, keep,
-    check, points, budget, resolution, max_views, threads, names, progress
+    images, masks, cameras, depths, *, prior, prior_model, head_model, calibrate, symmetry, relight, photo, cloud,
+    vehicle_size, sh_degree, keep, check, points, budget, resolution, max_views, threads, names, progress
 ))]
 pub(crate) fn reconstruct<'py>(
     py: Python<'py>,
@@ -34,6 +35,8 @@ pub(crate) fn reconstruct<'py>(
     cameras: Vec<Bound<'py, PyAny>>,
     depths: Option<Vec<Bound<'py, PyAny>>>,
     prior: &str,
+    prior_model: Option<Bound<'py, Model>>,
+    head_model: Option<Bound<'py, Model>>,
     calibrate: &str,
     symmetry: &str,
     relight: &str,
@@ -53,6 +56,8 @@ pub(crate) fn reconstruct<'py>(
 ) -> PyResult<(Gaussians, String, Option<Points<'py>>)> {
     let options = Options {
         prior: parse_prior(py, prior)?,
+        prior_model: prior_model.map(|model| model.get().inner.clone()),
+        head_model: head_model.map(|model| model.get().inner.clone()),
         calibrate: parse_calibrate(py, calibrate)?,
         symmetry: parse_symmetry(py, symmetry)?,
         relight: parse_relight(py, relight)?,
@@ -66,8 +71,6 @@ pub(crate) fn reconstruct<'py>(
         max_views,
         threads,
         points,
-        // Models are not lent to Python yet.
-        ..Options::default()
     };
     // Before the pixels are copied.
     options.validate().map_err(|e| from_library(py, e))?;
@@ -139,7 +142,7 @@ fn scene_of(
             bad_type(&format!("cameras[{i}]"), &found, "a Camera")
         })?;
         let camera = camera.get().inner;
-        let (image, cut_out) = picture(image, i, &camera)?;
+        let (image, cut_out) = picture(image, &format!("images[{i}]"), &camera)?;
         let mask = match masks.map(|list| &list[i]).filter(|o| !o.is_none()) {
             Some(object) => Some(mask(object, i, &camera)?),
             None => cut_out,
@@ -153,30 +156,33 @@ fn scene_of(
 }
 
 /// The picture, and the mask its alpha channel makes if it is transparent somewhere.
-fn picture(object: &Bound<'_, PyAny>, i: usize, camera: &vg::Camera) -> PyResult<(RgbImage, Option<Mask>)> {
+pub(crate) fn picture(
+    object: &Bound<'_, PyAny>,
+    argument: &str,
+    camera: &vg::Camera,
+) -> PyResult<(RgbImage, Option<Mask>)> {
     let py = object.py();
-    let argument = format!("images[{i}]");
     let pixels =
-        array::<u8>(object, &argument, "a NumPy array of uint8, (height, width, 3) or (height, width, 4)")?;
+        array::<u8>(object, argument, "a NumPy array of uint8, (height, width, 3) or (height, width, 4)")?;
     let (width, height) = (camera.width, camera.height);
     let format = match pixels.shape() {
         [h, w, 3] if (*h, *w) == (height as usize, width as usize) => PixelFormat::Rgb8,
         [h, w, 4] if (*h, *w) == (height as usize, width as usize) => PixelFormat::Rgba8,
         other => {
             let allowed = format!("({height}, {width}, 3) or ({height}, {width}, 4), its camera's size");
-            return Err(bad_value(py, &argument, &shape_text(other), &allowed));
+            return Err(bad_value(py, argument, &shape_text(other), &allowed));
         }
     };
     let data = values(&pixels)?;
     let stride = width as usize * format.bytes_per_pixel();
     let library = |e| from_library(py, e);
-    let image = RgbImage::from_strided(&argument, data, width, height, stride, format).map_err(library)?;
+    let image = RgbImage::from_strided(argument, data, width, height, stride, format).map_err(library)?;
     let alpha = || data.iter().skip(3).step_by(4).copied();
     if format == PixelFormat::Rgb8 || alpha().all(|a| a == u8::MAX) {
         return Ok((image, None));
     }
     let alpha: Vec<u8> = alpha().collect();
-    let mask = Mask::from_strided(&argument, &alpha, width, height, width as usize).map_err(library)?;
+    let mask = Mask::from_strided(argument, &alpha, width, height, width as usize).map_err(library)?;
     Ok((image, Some(mask)))
 }
 
@@ -261,7 +267,8 @@ fn parse_prior(py: Python<'_>, name: &str) -> PyResult<PriorChoice> {
         "given" => Ok(PriorChoice::Given),
         "hull" => Ok(PriorChoice::Hull),
         "shape" => Ok(PriorChoice::Shape),
-        other => Err(bad_value(py, "prior", &format!("{other:?}"), "auto, given, hull, shape")),
+        "onnx" => Ok(PriorChoice::Onnx),
+        other => Err(bad_value(py, "prior", &format!("{other:?}"), "auto, given, hull, shape, onnx")),
     }
 }
 

@@ -29,6 +29,8 @@ ENUMERATIONS = {
     "vg_format": capi.Format,
     "vg_camera_model": capi.CameraModel,
     "vg_prior": capi.Prior,
+    "vg_provider": capi.Provider,
+    "vg_prepack": capi.Prepack,
     "vg_calibrate": capi.Calibrate,
     "vg_symmetry": capi.Symmetry,
     "vg_relight": capi.Relight,
@@ -407,9 +409,6 @@ def test_errors_have_the_same_codes_and_texts(ellipsoid: Views, tmp_path: Path) 
         with pytest.raises(vg.VgError, match="^" + re.escape(message)) as caught:
             capi.reconstruct(**{**views, **options})
         assert caught.value.code is Status.ARGUMENT
-    with pytest.raises(vg.VgError) as caught:
-        capi.reconstruct(ellipsoid.images, ellipsoid.masks, ellipsoid.cameras, prior="onnx")
-    assert caught.value.code is Status.NOT_BUILT
 
 
 def test_a_status_nobody_knows_yet_is_an_internal_error() -> None:

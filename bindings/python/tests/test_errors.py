@@ -113,7 +113,7 @@ def test_lists_are_equally_long_and_not_empty(ellipsoid: Views) -> None:
 
 
 OPTIONS: list[tuple[dict[str, Any], str]] = [
-    ({"prior": "best"}, 'prior: "best"; allowed: auto, given, hull, shape'),
+    ({"prior": "best"}, 'prior: "best"; allowed: auto, given, hull, shape, onnx'),
     ({"calibrate": "yes"}, 'calibrate: "yes"; allowed: auto, off'),
     ({"relight": "always"}, 'relight: "always"; allowed: auto, never'),
     ({"budget": 0}, "budget: 0; allowed: seconds above 0"),

@@ -112,7 +112,8 @@ impl MethodArgs {
         })
     }
 
-    fn model_options(&self) -> ModelOptions {
+    /// How networks are opened.
+    pub(crate) fn model_options(&self) -> ModelOptions {
         ModelOptions {
             runtime: self.onnxruntime.clone(),
             provider: if self.provider == RunsOn::Cpu { Provider::Cpu } else { Provider::Cuda },
@@ -205,6 +206,9 @@ pub(crate) struct ReconstructArgs {
     pub(crate) frame: FrameArgs,
     #[command(flatten)]
     pub(crate) depth: DepthArgs,
+    /// A segmentation network, an ONNX file in the contract of docs/ONNX.md, for the views that have no mask
+    #[arg(long, value_name = "M.onnx")]
+    pub(crate) mask_model: Option<PathBuf>,
     /// The model, a PLY file in 3DGS's layout
     #[arg(short, long, value_name = "ASSET.ply")]
     pub(crate) output: PathBuf,

@@ -5,8 +5,11 @@ use crate::job::{Outcome, Result, note};
 use crate::shown::Bar;
 use crate::{cloud, files, scene, shown};
 use vg::io::ply;
+use vg::onnx::Model;
 use vg::pipeline::{self, BudgetPlan, Options, Reconstruction};
-use vg::{Scene, io};
+use vg::progress::Threads;
+use vg::scene::Segmenter;
+use vg::{Scene, View, io};
 
 /// Opens, reconstructs, writes.
 pub(crate) fn run(args: &ReconstructArgs) -> Result {
@@ -22,7 +25,7 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
     let read: Vec<_> = scene::files_of(&index)
         .into_iter()
         .chain(
-            [&args.method.cloud, &args.method.prior_model, &args.method.head_model]
+            [&args.method.cloud, &args.method.prior_model, &args.method.head_model, &args.mask_model]
                 .into_iter()
                 .flatten()
                 .cloned(),
@@ -32,6 +35,7 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
     outputs.iter().try_for_each(|path| files::prepare(path))?;
 
     let mut opened = scene::load(index)?;
+    let masks_by = fill_masks(args, &mut opened.scene.views)?;
     opened.scene.cloud = args.method.cloud.as_deref().map(cloud::read).transpose()?;
     let settings = Options { points: args.points.is_some(), check: !args.no_check, ..args.method.options()? };
     let made = reconstruct(&opened.scene, &settings)?;
@@ -50,7 +54,22 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
     if let Some(path) = &args.report {
         files::write_json(path, &made.report)?;
     }
-    Ok(Outcome::done(format!("{}: {}", args.output.display(), summary(&made))))
+    Ok(Outcome::done(format!("{}: {}{masks_by}", args.output.display(), summary(&made))))
+}
+
+/// Masks of a network for the views that have none, and what to say of it. The network is opened only then.
+fn fill_masks(args: &ReconstructArgs, views: &mut [View]) -> Result<String> {
+    let Some(path) = &args.mask_model else { return Ok(String::new()) };
+    if views.iter().all(|view| view.mask.is_some()) {
+        note(&format!("{}: not opened, every view has a mask", path.display()));
+        return Ok(String::new());
+    }
+    let segmenter = Segmenter::new(Model::open(path, &args.method.model_options())?)?;
+    let filled = Threads::new(args.method.threads)?.run(|| segmenter.fill(views))?;
+    for view in views.iter().filter(|v| v.mask.as_ref().is_some_and(|m| m.vehicle_pixels() == 0)) {
+        note(&format!("{}: no vehicle pixel in its mask", view.name));
+    }
+    Ok(format!("; masks of {filled} views by {}", segmenter.name()))
 }
 
 /// With progress on a terminal.

@@ -7,7 +7,6 @@
 
 mod agreement;
 mod contract;
-mod fit;
 
 pub use agreement::{PoseFit, ViewFit};
 
@@ -16,11 +15,11 @@ use crate::error::{Error, Result};
 use crate::geometry::Pose;
 use crate::onnx::{Input, Model};
 use crate::progress::Context;
+use crate::scene::fit::{Fit, ray};
 use crate::scene::mask::Label;
 use crate::scene::{DepthMap, View};
 use agreement::{fit_poses, fit_views, median};
 use contract::{Contract, DepthKind};
-use fit::{Fit, ray};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -79,24 +78,27 @@ impl DepthPrior for NetworkPrior {
     }
 
     fn estimate(&self, views: &[View], context: &Context) -> Result<Geometry> {
-        if let Some(n) = self.contract.views.filter(|n| *n != views.len()) {
+        if let Some(n) = self.contract.framing.views.filter(|n| *n != views.len()) {
             let allowed =
                 format!("{n}: the network of {} takes no other number", self.model.path().display());
             return Err(Error::argument("views", views.len().to_string(), allowed));
         }
         let given = relative_to_first(views);
         let aspect = |v: &View| f64::from(v.camera.width) / f64::from(v.camera.height);
-        let size = self.contract.size_for(views.iter().map(aspect).sum::<f64>() / views.len() as f64);
+        let size = self.contract.framing.size_for(views.iter().map(aspect).sum::<f64>() / views.len() as f64);
         let fit = |(i, view): (usize, &View)| {
             let (width, height) = (view.camera.width, view.camera.height);
-            Fit::new(width, height, size, self.contract.resize).ok_or_else(|| {
+            Fit::new(width, height, size, self.contract.framing.resize).ok_or_else(|| {
                 let allowed = format!("a shape nearer to the network's {} x {}", size.0, size.1);
                 Error::argument(format!("{}.image", view.argument(i)), format!("{width}x{height}"), allowed)
             })
         };
         let fits: Vec<Fit> = views.iter().enumerate().map(fit).collect::<Result<_>>()?;
         let pictures: Vec<Vec<f32>> = context.parallel(|| {
-            fits.par_iter().zip(views).map(|(fit, view)| fit.picture(view, &self.contract)).collect()
+            fits.par_iter()
+                .zip(views)
+                .map(|(fit, view)| fit.picture(&view.image, &self.contract.framing))
+                .collect()
         });
         context.report("prior", 0.1)?;
         let said = self.run(views, &fits, &given, &pictures.concat())?;

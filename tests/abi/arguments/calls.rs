@@ -316,6 +316,7 @@ pub enum Made {
     Gaussians,
     Report,
     Scene,
+    Model,
 }
 
 impl Made {
@@ -326,6 +327,7 @@ impl Made {
                 Self::Gaussians => vg_gaussians_free(handle as _),
                 Self::Report => vg_report_free(handle as _),
                 Self::Scene => vg_scene_free(handle as _),
+                Self::Model => vg_model_free(handle as _),
             }
         }
     }
@@ -378,6 +380,8 @@ pub struct Call {
     invoke: Invoke,
     /// Whether there is an `out_error`.
     has_error: bool,
+    /// What it returns where nothing is wrong with its arguments.
+    pub good: vg_status,
 }
 
 /// What came of a call.
@@ -424,7 +428,15 @@ macro_rules! invoke_init {
 
 impl Call {
     fn new(function: &'static str, invoke: Invoke) -> Self {
-        Self { function, arguments: vec![], inputs: vec![], targets: vec![], invoke, has_error: true }
+        Self {
+            function,
+            arguments: vec![],
+            inputs: vec![],
+            targets: vec![],
+            invoke,
+            has_error: true,
+            good: vg_status::Ok,
+        }
     }
 
     fn argument(mut self, name: &'static str, value: Value) -> Self {
@@ -796,7 +808,7 @@ const SIMILARITY: [f64; 16] =
 const POSE: [f64; 12] = [0.0, -1.0, 0.0, 4e5, 1.0, 0.0, 0.0, 5e6, 0.0, 0.0, 1.0, 100.0];
 
 /// A call that works, for each function that can fail.
-pub const CALLS: [fn(&World) -> Call; 31] = [
+pub const CALLS: [fn(&World) -> Call; 35] = [
     context_options_init,
     context_new,
     camera_init,
@@ -809,6 +821,8 @@ pub const CALLS: [fn(&World) -> Call; 31] = [
     pose_from_box,
     camera_project,
     view_init,
+    model_options_init,
+    model_open,
     options_init,
     report_figures_init,
     report_get_figures,
@@ -824,6 +838,8 @@ pub const CALLS: [fn(&World) -> Call; 31] = [
     image_target_init,
     render,
     render_through_a_lens,
+    segment_options_init,
+    segment,
     scene_options_init,
     colmap_open,
     transforms_open,
@@ -831,15 +847,17 @@ pub const CALLS: [fn(&World) -> Call; 31] = [
 ];
 
 /// `sizeof` in the release that introduced them: no caller has shorter ones.
-pub const FIRST_SIZES: [(&str, usize); 9] = [
+pub const FIRST_SIZES: [(&str, usize); 11] = [
     ("vg_context_options", 16),
     ("vg_camera", 280),
     ("vg_view", 392),
+    ("vg_model_options", 40),
     ("vg_options", 96),
     ("vg_report_figures", 152),
     ("vg_gaussian_arrays", 64),
     ("vg_render_options", 72),
     ("vg_image_target", 56),
+    ("vg_segment_options", 24),
     ("vg_scene_options", 72),
 ];
 
@@ -865,11 +883,13 @@ macro_rules! init_of {
 init_of!(context_options_init, vg_context_options_init, "options", context_options());
 init_of!(camera_init, vg_camera_init, "camera", Lent::zeroed::<vg_camera>("vg_camera", camera_fields()));
 init_of!(view_init, vg_view_init, "view", Lent::zeroed::<vg_view>("vg_view", view_fields()));
+init_of!(model_options_init, vg_model_options_init, "options", model_options());
 init_of!(options_init, vg_options_init, "options", options(0));
 init_of!(report_figures_init, vg_report_figures_init, "figures", figures());
 init_of!(gaussian_arrays_init, vg_gaussian_arrays_init, "arrays", arrays(0, [0; 5], 0));
 init_of!(render_options_init, vg_render_options_init, "options", render_options(0));
 init_of!(image_target_init, vg_image_target_init, "target", target(0, 0, 0, 0));
+init_of!(segment_options_init, vg_segment_options_init, "options", segment_options(0));
 init_of!(scene_options_init, vg_scene_options_init, "options", scene_options(0));
 
 fn context_options() -> Lent {
@@ -1119,11 +1139,44 @@ pub fn gaussians_merge(w: &World) -> Call {
         .argument("out", Value::OutHandle(Made::Gaussians))
 }
 
+fn model_options() -> Lent {
+    let fields = fields!(vg_model_options {
+        struct_size: elsewhere(),
+        runtime: elsewhere(),
+        provider: choice(&[0, 1]),
+        fall_back: choice(&[0, 1]),
+        threads: [counts(&[1025, 1 << 31, u64::from(u32::MAX)]), vec![(1024, Fine)]].concat(),
+        prepack: choice(&[0, 1, 2]),
+        arena: choice(&[0, 1]),
+        flags: reserved(),
+    });
+    Lent::zeroed::<vg_model_options>("vg_model_options", fields)
+}
+
+/// A file that is not there: what is wrong with an argument is said first.
+pub fn model_open(w: &World) -> Call {
+    let mut call = Call::new("vg_model_open", invoke!(vg_model_open 0 1 2))
+        .argument("path", Value::Text(text(w.scratch.join("no.onnx"))))
+        .argument("options", Value::Struct(model_options()))
+        .nullable()
+        .argument("out", Value::OutHandle(Made::Model));
+    call.good = if vg::onnx::is_built() { vg_status::Io } else { vg_status::NotBuilt };
+    call
+}
+
+/// With networks, one without a model, which `options.prior_model` tells.
+fn priors() -> Tries {
+    match vg::onnx::is_built() {
+        true => [choice(&[0, 1, 2, 4]), counts(&[3])].concat(),
+        false => choice_without(&[0, 1, 2, 4], 3),
+    }
+}
+
 fn options(context: usize) -> Lent {
     let fields = fields!(vg_options {
         struct_size: elsewhere(),
         context: elsewhere(),
-        prior: choice_without(&[0, 1, 2, 4], 3),
+        prior: priors(),
         symmetry: choice(&[0, 1, 2, 3]),
         sh_degree: choice(&[0, 1, 2, 3]),
         keep: vec![(31, Fine), (32, Refused), (u64::from(u32::MAX), Refused)],
@@ -1143,6 +1196,8 @@ fn options(context: usize) -> Lent {
         cloud_count: counts(&[10_000_001, 1 << 60, u64::MAX]),
         resolution: share(),
         max_views: [0, 1, 4097, 1 << 60, u64::MAX].map(|n| (n, Fine)).to_vec(),
+        prior_model: elsewhere(),
+        head_model: elsewhere(),
     });
     let mut lent = Lent::zeroed::<vg_options>("vg_options", fields);
     lent.put("context", 0, context as u64);
@@ -1257,6 +1312,41 @@ fn render_as(w: &World, function: &'static str, camera: Lent) -> Call {
         .nullable()
         .argument("target", Value::Struct(lent));
     call.targets = vec![color, depth];
+    call
+}
+
+fn segment_options(context: usize) -> Lent {
+    let fields = fields!(vg_segment_options {
+        struct_size: elsewhere(),
+        context: elsewhere(),
+        flags: vec![(0, Fine), (1, Refused), (1 << 63, Refused)],
+    });
+    let mut lent = Lent::zeroed::<vg_segment_options>("vg_segment_options", fields);
+    lent.put("context", 0, context as u64);
+    lent
+}
+
+/// Without a model, which is told last; the picture lies at an odd address.
+pub fn segment(w: &World) -> Call {
+    let mut memory = Vec::new();
+    let view = w.photographs[0].view(0, &mut memory);
+    memory.push(Memory::of(&[view.image], 3));
+    let image = memory.last_mut().expect("a picture").pointer();
+    let stride = WIDTH as usize + 5;
+    let mut mask = blank(HEIGHT, WIDTH as usize, stride, 1, false);
+    let mut call = Call::new("vg_segment", invoke!(vg_segment 0 1 2 3 4 5))
+        .argument("model", Value::Null)
+        .nullable()
+        .argument("image", Value::Handle(image))
+        .argument("camera", Value::Struct(w.camera()))
+        .argument("options", Value::Struct(segment_options(w.context)))
+        .nullable()
+        .argument("out_mask", Value::Handle(mask.memory.pointer()))
+        .argument("row_stride", Value::Number(stride as u64))
+        .tries(counts(&[1, 47, usize::MAX as u64, usize::MAX as u64 / 2]))
+        .memory(memory);
+    call.targets = vec![mask];
+    call.good = if vg::onnx::is_built() { vg_status::Argument } else { vg_status::NotBuilt };
     call
 }
 

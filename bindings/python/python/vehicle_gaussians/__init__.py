@@ -15,10 +15,12 @@ from ._errors import Status, VgError
 from ._native import (
     Camera,
     Gaussians,
+    Model,
     __version__,
     pose_from_box,
     pose_from_colmap,
     pose_from_opengl,
+    segment,
     similarity_from_points,
 )
 from ._reconstruct import Points, Reconstruction, reconstruct
@@ -27,6 +29,7 @@ from ._scene import Scene, open_scene
 __all__ = [
     "Camera",
     "Gaussians",
+    "Model",
     "Points",
     "Reconstruction",
     "Scene",
@@ -38,5 +41,6 @@ __all__ = [
     "pose_from_colmap",
     "pose_from_opengl",
     "reconstruct",
+    "segment",
     "similarity_from_points",
 ]

@@ -1,5 +1,6 @@
 from collections.abc import Callable, Sequence
 from os import PathLike
+from pathlib import Path
 from typing import Literal, final, overload
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy.typing as npt
 __all__ = [
     "Camera",
     "Gaussians",
+    "Model",
     "__version__",
     "_panic_on_a_worker_thread",
     "open_scene",
@@ -15,6 +17,7 @@ __all__ = [
     "pose_from_colmap",
     "pose_from_opengl",
     "reconstruct",
+    "segment",
     "similarity_from_points",
 ]
 
@@ -154,6 +157,21 @@ class Gaussians:
     def bounds(self) -> npt.NDArray[np.float32] | None: ...
     def __len__(self) -> int: ...
 
+@final
+class Model:
+    def __new__(
+        cls,
+        path: str | PathLike[str],
+        runtime: str | PathLike[str] | None = None,
+        provider: Literal["cpu", "cuda"] = "cpu",
+        fall_back: bool = False,
+        threads: int = 0,
+        prepack: bool | None = None,
+        arena: bool = False,
+    ) -> Model: ...
+    @property
+    def path(self) -> Path: ...
+
 def pose_from_colmap(
     qvec: npt.ArrayLike,
     tvec: npt.ArrayLike,
@@ -165,6 +183,12 @@ def pose_from_opengl(
 ) -> npt.NDArray[np.float64]: ...
 def pose_from_box(ego_from_vehicle: npt.ArrayLike, ego_from_camera: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
 def similarity_from_points(source: npt.ArrayLike, target: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
+def segment(
+    model: Model,
+    image: npt.NDArray[np.uint8],
+    camera: Camera,
+    threads: int = 0,
+) -> npt.NDArray[np.bool_]: ...
 def reconstruct(
     images: Sequence[object],
     masks: Sequence[object] | None,
@@ -172,6 +196,8 @@ def reconstruct(
     depths: Sequence[object] | None,
     *,
     prior: str,
+    prior_model: Model | None,
+    head_model: Model | None,
     calibrate: str,
     symmetry: str,
     relight: str,

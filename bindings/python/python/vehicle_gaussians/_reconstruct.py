@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
-from ._native import Camera, Gaussians
+from ._native import Camera, Gaussians, Model
 
 #: Masks are bool, or uint8 where 128 and above is vehicle.
 Mask: TypeAlias = npt.NDArray[np.bool_] | npt.NDArray[np.uint8]
@@ -44,7 +44,9 @@ def reconstruct(
     cameras: Iterable[Camera],
     depths: Iterable[npt.NDArray[np.float32] | None] | None = None,
     *,
-    prior: Literal["auto", "given", "hull", "shape"] = "auto",
+    prior: Literal["auto", "given", "hull", "shape", "onnx"] = "auto",
+    prior_model: Model | None = None,
+    head_model: Model | None = None,
     calibrate: Literal["auto", "off"] = "auto",
     symmetry: Literal["auto", "always", "never", "flip"] = "auto",
     relight: Literal["auto", "never"] = "auto",
@@ -69,8 +71,9 @@ def reconstruct(
     cameras: one per image, posed in the vehicle's frame (x forward, y left, z up, metres; y = 0 is the plane of
     symmetry).
     depths: float32 (height, width), metres along the optical axis, 0 for none.
-    prior: "given" takes the depths, "hull" the silhouettes, "shape" the silhouettes and what vehicles look like; "auto"
-    the depths if every used view has them, else "shape".
+    prior: "given" takes the depths, "hull" the silhouettes, "shape" the silhouettes and what vehicles look like,
+    "onnx" the network prior_model; "auto" the depths if every used view has them, else "shape".
+    prior_model, head_model: networks that tell depth, and that make Gaussians of pixels.
     calibrate: correct cameras and the plane of symmetry where the silhouettes contradict them ("auto"), or take them
     as they are ("off").
     symmetry: mirror what no view observed ("auto"), all of the denser side ("always"), nothing ("never"), or the
@@ -100,6 +103,8 @@ def reconstruct(
         list(cameras),
         None if depths is None else list(depths),
         prior=prior,
+        prior_model=prior_model,
+        head_model=head_model,
         calibrate=calibrate,
         symmetry=symmetry,
         relight=relight,

@@ -57,6 +57,18 @@ class Prior(enum.IntEnum):
     AUTO, GIVEN, HULL, ONNX, SHAPE = range(5)
 
 
+class Provider(enum.IntEnum):
+    """vg_provider"""
+
+    CPU, CUDA = range(2)
+
+
+class Prepack(enum.IntEnum):
+    """vg_prepack"""
+
+    AUTO, ALWAYS, NEVER = range(3)
+
+
 class Calibrate(enum.IntEnum):
     """vg_calibrate"""
 
@@ -162,6 +174,19 @@ class vg_view(ct.Structure):
     )
 
 
+class vg_model_options(ct.Structure):
+    _fields_ = (
+        ("struct_size", ct.c_size_t),
+        ("runtime", ct.c_char_p),
+        ("provider", ct.c_int32),
+        ("fall_back", ct.c_int32),
+        ("threads", ct.c_uint32),
+        ("prepack", ct.c_int32),
+        ("arena", ct.c_int32),
+        ("flags", ct.c_uint32),
+    )
+
+
 class vg_options(ct.Structure):
     _fields_ = (
         ("struct_size", ct.c_size_t),
@@ -186,6 +211,8 @@ class vg_options(ct.Structure):
         ("cloud_count", ct.c_size_t),
         ("resolution", ct.c_double),
         ("max_views", ct.c_size_t),
+        ("prior_model", ct.c_void_p),
+        ("head_model", ct.c_void_p),
     )
 
 
@@ -266,6 +293,10 @@ class vg_image_target(ct.Structure):
     )
 
 
+class vg_segment_options(ct.Structure):
+    _fields_ = (("struct_size", ct.c_size_t), ("context", ct.c_void_p), ("flags", ct.c_uint64))
+
+
 class vg_scene_options(ct.Structure):
     _fields_ = (
         ("struct_size", ct.c_size_t),
@@ -318,6 +349,9 @@ PROTOTYPES: Mapping[str, tuple[Any, tuple[Any, ...]]] = {
     "vg_pose_from_box": (_i32, (_numbers, _numbers, _numbers, _out)),
     "vg_camera_project": (_i32, (_pointer(vg_camera), _numbers, _numbers, _out)),
     "vg_view_init": (_i32, (_pointer(vg_view), _size)),
+    "vg_model_options_init": (_i32, (_pointer(vg_model_options), _size)),
+    "vg_model_open": (_i32, (_text, _pointer(vg_model_options), _out, _out)),
+    "vg_model_free": (None, (_handle,)),
     "vg_options_init": (_i32, (_pointer(vg_options), _size)),
     "vg_report_figures_init": (_i32, (_pointer(vg_report_figures), _size)),
     "vg_report_get_figures": (_i32, (_handle, _pointer(vg_report_figures), _out)),
@@ -347,6 +381,11 @@ PROTOTYPES: Mapping[str, tuple[Any, tuple[Any, ...]]] = {
     "vg_render": (
         _i32,
         (_handle, _pointer(vg_camera), _pointer(vg_render_options), _pointer(vg_image_target), _out),
+    ),
+    "vg_segment_options_init": (_i32, (_pointer(vg_segment_options), _size)),
+    "vg_segment": (
+        _i32,
+        (_handle, _pointer(vg_image), _pointer(vg_camera), _pointer(vg_segment_options), _numbers, _size, _out),
     ),
     "vg_scene_options_init": (_i32, (_pointer(vg_scene_options), _size)),
     "vg_colmap_open": (_i32, (_text, _pointer(vg_scene_options), _out, _out)),
@@ -460,6 +499,35 @@ class Context(_Handle):
     @property
     def threads(self) -> int:
         return int(library.vg_context_threads(self))
+
+
+class Model(_Handle):
+    """A network in an ONNX file, for prior_model and head_model of reconstruct; the arguments are those of
+    vehicle_gaussians.Model. Any number of threads may use one at a time."""
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        runtime: str | os.PathLike[str] | None = None,
+        provider: Literal["cpu", "cuda"] = "cpu",
+        fall_back: bool = False,
+        threads: int = 0,
+        prepack: bool | None = None,
+        arena: bool = False,
+    ) -> None:
+        options = _initial(vg_model_options)
+        options.runtime = None if runtime is None else os.fsencode(runtime)
+        options.provider = _choice(Provider, "provider", provider)
+        options.fall_back, options.threads, options.arena = fall_back, threads, arena
+        options.prepack = {None: Prepack.AUTO, True: Prepack.ALWAYS, False: Prepack.NEVER}[prepack]
+        made = ct.c_void_p()
+        _call("vg_model_open", os.fsencode(path), ct.byref(options), ct.byref(made))
+        super().__init__("model", made)
+        #: The file.
+        self.path = Path(path)
+
+    def __repr__(self) -> str:
+        return f"Model({str(self.path)!r})"
 
 
 class AnyCamera(Protocol):
@@ -761,7 +829,9 @@ def reconstruct(
     cameras: Iterable[Camera],
     depths: Iterable[npt.NDArray[np.float32] | None] | None = None,
     *,
-    prior: Literal["auto", "given", "hull", "shape"] = "auto",
+    prior: Literal["auto", "given", "hull", "shape", "onnx"] = "auto",
+    prior_model: Model | None = None,
+    head_model: Model | None = None,
     calibrate: Literal["auto", "off"] = "auto",
     symmetry: Literal["auto", "always", "never", "flip"] = "auto",
     relight: Literal["auto", "never"] = "auto",
@@ -810,6 +880,9 @@ def reconstruct(
     options = _initial(vg_options)
     options.context = None if context is None else context._as_parameter_
     options.prior, options.symmetry = _choice(Prior, "prior", prior), _choice(Symmetry, "symmetry", symmetry)
+    # Referred to by this call's arguments until it returns.
+    options.prior_model = _lent_model(prior_model, "prior_model")
+    options.head_model = _lent_model(head_model, "head_model")
     options.calibrate = _choice(Calibrate, "calibrate", calibrate)
     options.relight, options.photo = _choice(Relight, "relight", relight), photo
     if budget is not None:
@@ -904,6 +977,12 @@ def _choice(choices: type[enum.IntEnum], argument: str, name: str) -> int:
     return int(member)
 
 
+def _lent_model(model: Model | None, argument: str) -> int | None:
+    if model is not None and not isinstance(model, Model):
+        raise TypeError(f"{argument}: {type(model).__name__}; allowed: a Model")
+    return None if model is None else model._as_parameter_
+
+
 def _expect(array: Any, argument: str, *dtypes: npt.DTypeLike) -> None:
     if not isinstance(array, np.ndarray) or all(array.dtype != np.dtype(d) for d in dtypes):
         found = f"array of {array.dtype}" if isinstance(array, np.ndarray) else type(array).__name__
@@ -942,6 +1021,22 @@ def _lent(array: npt.NDArray[Any], format: Format, alive: list[Any]) -> vg_image
         array = np.ascontiguousarray(array)
     alive.append(array)
     return vg_image(array.ctypes.data, array.strides[0], width, height, format, 0)
+
+
+def segment(
+    model: Model, image: npt.NDArray[np.uint8], camera: Camera, *, context: Context | None = None
+) -> npt.NDArray[np.uint8]:
+    """The mask of a photograph that has none, by a segmentation network: uint8 (height, width), 255 is the vehicle.
+
+    The image is RGB or RGBA and read where it is; alpha is not looked at.
+    """
+    _lent_model(model, "model")
+    alive: list[Any] = []
+    picture, posed, options = _photograph(image, "image", alive), _camera(camera), _initial(vg_segment_options)
+    options.context = None if context is None else context._as_parameter_
+    mask = np.empty((picture.height, picture.width), np.uint8)
+    _call("vg_segment", model, ct.byref(picture), ct.byref(posed), ct.byref(options), mask.ctypes.data, 0)
+    return mask
 
 
 class Scene(NamedTuple):

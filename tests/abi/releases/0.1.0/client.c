@@ -186,6 +186,46 @@ static void colmap_without_a_folder(void) {
     vg_scene_free(NULL);
 }
 
+/* In a build without networks that is the answer; with them, and no such file, another. */
+static void models_without_a_file(const vg_view *views, size_t count, vg_context *context) {
+    static uint8_t mask[64 * 48];
+    vg_model_options settings;
+    vg_segment_options segment;
+    vg_options options;
+    vg_model *model = (vg_model *)&settings;
+    vg_gaussians *car = NULL;
+    vg_error *error = NULL;
+    vg_status built;
+
+    CHECK(vg_model_options_init(&settings, sizeof settings) == VG_STATUS_OK);
+    CHECK(settings.runtime == NULL && settings.provider == VG_PROVIDER_CPU && settings.fall_back == 0);
+    CHECK(settings.threads == 0 && settings.prepack == VG_PREPACK_AUTO && settings.arena == 0);
+    settings.threads = 2;
+    built = vg_model_open("/nowhere/at/all.onnx", &settings, &model, NULL);
+    CHECK(model == NULL && (built == VG_STATUS_NOT_BUILT || built == VG_STATUS_IO));
+    FAILS(vg_model_open("/nowhere/at/all.onnx", NULL, &model, &error), built, built == VG_STATUS_IO ? "all.onnx" : "onnx");
+    settings.provider = 9;
+    FAILS(vg_model_open("x.onnx", &settings, &model, &error), VG_STATUS_ARGUMENT, "options.provider: 9");
+    FAILS(vg_model_open(NULL, NULL, &model, &error), VG_STATUS_ARGUMENT, "path: NULL");
+    vg_model_free(model);
+
+    CHECK(vg_options_init(&options, sizeof options) == VG_STATUS_OK);
+    CHECK(options.prior_model == NULL && options.head_model == NULL);
+    options.prior = VG_PRIOR_ONNX;
+    FAILS(vg_reconstruct(views, count, &options, &car, NULL, &error),
+          built == VG_STATUS_IO ? VG_STATUS_ARGUMENT : VG_STATUS_NOT_BUILT, "options.prior");
+    CHECK(car == NULL);
+
+    CHECK(vg_segment_options_init(&segment, sizeof segment) == VG_STATUS_OK && segment.context == NULL);
+    segment.context = context;
+    FAILS(vg_segment(NULL, &views[0].image, &views[0].camera, &segment, mask, 7, &error), VG_STATUS_ARGUMENT,
+          "row_stride: 7 bytes");
+    FAILS(vg_segment(NULL, &views[0].image, &views[0].camera, &segment, NULL, 0, &error), VG_STATUS_ARGUMENT, "out_mask");
+    FAILS(vg_segment(NULL, &views[0].image, &views[0].camera, NULL, mask, 0, &error),
+          built == VG_STATUS_IO ? VG_STATUS_ARGUMENT : VG_STATUS_NOT_BUILT, "model");
+    CHECK(mask[0] == 0);
+}
+
 static vg_gaussians *reconstruct(vg_context *context, const vg_view *views, size_t count) {
     vg_options options;
     vg_report_figures figures;
@@ -253,8 +293,6 @@ static vg_gaussians *reconstruct(vg_context *context, const vg_view *views, size
         vg_gaussians_free(again);
         again = NULL;
     }
-    options.prior = VG_PRIOR_ONNX;
-    CHECK(vg_reconstruct(views, count, &options, &again, NULL, NULL) != VG_STATUS_OK);
     return car;
 }
 
@@ -423,6 +461,7 @@ int main(int argc, char **argv) {
     }
     FAILS(vg_scene_get_view(scene, 4, &views[0], &error), VG_STATUS_ARGUMENT, "index");
 
+    models_without_a_file(views, 4, context);
     car = reconstruct(context, views, 4);
     n = vg_gaussians_count(car);
     print_hash("positions", vg_gaussians_positions(car), n * 3 * sizeof(float));

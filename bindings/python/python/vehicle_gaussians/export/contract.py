@@ -1,4 +1,5 @@
-"""What an ONNX file has to look like: the contract "geometry prior", version 1, and that of the perceptual distance.
+"""What an ONNX file has to look like: the contract "geometry prior", version 1, and those of the segmentation and the
+perceptual distance.
 
 All tensors are float32, views first, without a batch axis. N views of H x W pixels:
 
@@ -9,7 +10,8 @@ outputs   depth (N,H,W) above 0; rays (N,H,W,3) unit vectors in the camera's axe
           confidence (N,H,W) of which only the order counts; mask (N,H,W) probability; cam_to_ref_pred (N,4,4)
           predicted poses, translations in the unit of depth.
 
-Required are images and depth. What else the host needs to know is in the file's metadata, see `KEYS`.
+Required are images and depth. What else the host needs to know is in the file's metadata, see `PRIOR`. A
+segmentation has images and mask (N,H,W), the probability of vehicle; N may be fixed to 1.
 
     python -m vehicle_gaussians.export.contract FILE.onnx
 """
@@ -22,7 +24,7 @@ import re
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from .script import need, run
 
@@ -42,8 +44,6 @@ OUTPUTS: dict[str, Shape] = {
     "mask": ("N", "H", "W"),
     "cam_to_ref_pred": ("N", 4, 4),
 }
-LPIPS_INPUTS: dict[str, Shape] = {"a": ("N", 3, "H", "W"), "b": ("N", 3, "H", "W")}
-LPIPS_OUTPUTS: dict[str, Shape] = {"lpips": ("N",)}
 
 
 def one_of(*allowed: str) -> Callable[[str], str | None]:
@@ -68,27 +68,58 @@ def some_text(text: str) -> str | None:
 
 
 #: Known keys: whether each is required, and what its value may be. Other keys are ignored.
-KEYS: dict[str, tuple[bool, Callable[[str], str | None]]] = {
-    "vg.contract": (True, one_of(VERSION)),
-    "vg.prior": (True, some_text),
-    "vg.depth": (True, one_of("along_ray", "z")),
-    "vg.metric": (True, one_of("true", "false")),
+Keys = Mapping[str, tuple[bool, Callable[[str], str | None]]]
+#: How photographs come to H x W.
+FRAMING: Keys = {
     "vg.size_multiple": (False, whole_number),
     "vg.long_side": (False, whole_number),
     "vg.resize": (False, one_of("cover_crop", "stretch")),
     "vg.mean": (False, three_numbers),
     "vg.std": (False, three_numbers),
-    "vg.license": (False, some_text),
-    "vg.weights": (False, some_text),
 }
-LPIPS_KEYS: dict[str, tuple[bool, Callable[[str], str | None]]] = {
-    "vg.contract": (True, one_of(VERSION)),
-    "vg.metric": (True, one_of("lpips")),
-    "vg.lpips.net": (True, one_of("alex", "vgg", "squeeze")),
-    "vg.range": (True, one_of("0..1")),
-    "vg.license": (False, some_text),
-    "vg.weights": (False, some_text),
-}
+ORIGIN: Keys = {"vg.license": (False, some_text), "vg.weights": (False, some_text)}
+
+
+class Contract(NamedTuple):
+    """What one kind of file promises."""
+
+    keys: Keys
+    inputs: Mapping[str, Shape]
+    outputs: Mapping[str, Shape]
+    required: tuple[str, ...]
+
+
+PRIOR = Contract(
+    {
+        "vg.contract": (True, one_of(VERSION)),
+        "vg.prior": (True, some_text),
+        "vg.depth": (True, one_of("along_ray", "z")),
+        "vg.metric": (True, one_of("true", "false")),
+        **FRAMING,
+        **ORIGIN,
+    },
+    INPUTS,
+    OUTPUTS,
+    ("images", "depth"),
+)
+SEGMENTATION = Contract(
+    {"vg.contract": (True, one_of(VERSION)), "vg.mask": (True, some_text), **FRAMING, **ORIGIN},
+    {"images": ("N", 3, "H", "W")},
+    {"mask": ("N", "H", "W")},
+    ("images", "mask"),
+)
+LPIPS = Contract(
+    {
+        "vg.contract": (True, one_of(VERSION)),
+        "vg.metric": (True, one_of("lpips")),
+        "vg.lpips.net": (True, one_of("alex", "vgg", "squeeze")),
+        "vg.range": (True, one_of("0..1")),
+        **ORIGIN,
+    },
+    {"a": ("N", 3, "H", "W"), "b": ("N", 3, "H", "W")},
+    {"lpips": ("N",)},
+    ("a", "b", "lpips"),
+)
 
 
 class ContractError(Exception):
@@ -121,17 +152,18 @@ def check(path: str | os.PathLike[str]) -> dict[str, str]:
     path = Path(path)
     model = load(path)
     metadata = {entry.key: entry.value for entry in model.metadata_props}
-    perceptual = metadata.get("vg.metric") == "lpips"
-    check_metadata(metadata, LPIPS_KEYS if perceptual else KEYS)
-    inputs, outputs = (LPIPS_INPUTS, LPIPS_OUTPUTS) if perceptual else (INPUTS, OUTPUTS)
-    required = ("a", "b", "lpips") if perceptual else ("images", "depth")
+    kind = kind_of(metadata)
+    check_metadata(metadata, kind.keys)
     stored = {tensor.name for tensor in model.graph.initializer}
     given = [value for value in model.graph.input if value.name not in stored]
     sizes: dict[str, int | str] = {}
-    check_values("input", given, inputs, required, sizes)
-    check_values("output", model.graph.output, outputs, required, sizes)
-    if not perceptual:
+    check_values("input", given, kind.inputs, kind.required, sizes)
+    check_values("output", model.graph.output, kind.outputs, kind.required, sizes)
+    if "images" in kind.inputs:
         check_size(metadata, sizes)
+    if kind is SEGMENTATION and sizes["N"] not in (1, "dynamic"):
+        raise ContractError(f"input images: N is {sizes['N']}; allowed: 1 or dynamic, views are shown one by one")
+    if kind is PRIOR:
         names = {value.name for value in model.graph.output}
         if metadata["vg.metric"] == "false" and "cam_to_ref_pred" not in names:
             raise ContractError(
@@ -141,6 +173,12 @@ def check(path: str | os.PathLike[str]) -> dict[str, str]:
     check_operators(model)
     check_external_data(model, path)
     return metadata
+
+
+def kind_of(metadata: Mapping[str, str]) -> Contract:
+    if metadata.get("vg.metric") == "lpips":
+        return LPIPS
+    return SEGMENTATION if "vg.mask" in metadata else PRIOR
 
 
 def load(path: Path) -> Any:
@@ -155,7 +193,7 @@ def load(path: Path) -> Any:
         raise ContractError("not an ONNX file") from error
 
 
-def check_metadata(metadata: Mapping[str, str], keys: Mapping[str, tuple[bool, Callable[[str], str | None]]]) -> None:
+def check_metadata(metadata: Mapping[str, str], keys: Keys) -> None:
     for key, (required, refuses) in keys.items():
         if key not in metadata:
             if required:

@@ -10,7 +10,7 @@ import torch
 from lpips import LPIPS
 from torch import Tensor, nn
 
-from .script import Unavailable
+from .script import Unavailable, downloaded
 
 #: torchvision's backbones, with the file that its loader keeps below TORCH_HOME.
 BACKBONES = {
@@ -55,18 +55,7 @@ def load_backbone(model: Any, net: str, file: Path) -> None:
 
 def backbone_file(net: str) -> Path:
     """torchvision's file: in torch's cache, or downloaded there."""
-    name = BACKBONES[net][1]
-    file = Path(torch.hub.get_dir()) / "checkpoints" / name
-    if not file.is_file():
-        file.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            torch.hub.download_url_to_file(ADDRESS + name, str(file), hash_prefix=file.stem.rpartition("-")[2])
-        except (OSError, RuntimeError) as error:
-            raise Unavailable(
-                f"the backbone's weights cannot be had ({error}): where the network is, "
-                f"`curl -O {ADDRESS}{name}`, then --backbone {name}"
-            ) from error
-    return file
+    return downloaded(ADDRESS + BACKBONES[net][1], "backbone's weights", "--backbone")
 
 
 def example_inputs(pairs: int, height: int, width: int, seed: int) -> dict[str, Tensor]:

@@ -122,6 +122,22 @@ def licence(weights: str, known: dict[str, str], stated: str | None) -> str:
     raise Unavailable(f"--license: missing; the licence of {weights} is not known here, known are: {', '.join(known)}")
 
 
+def downloaded(address: str, what: str, option: str) -> Path:
+    """The file of a public address: in torch's cache, or downloaded there; `option` takes one that is at hand."""
+    hub = need("torch.hub", PACKAGES)
+    name = address.rpartition("/")[2]
+    file = Path(hub.get_dir()) / "checkpoints" / name
+    if not file.is_file():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            hub.download_url_to_file(address, str(file), hash_prefix=file.stem.rpartition("-")[2])
+        except (OSError, RuntimeError) as error:
+            raise Unavailable(
+                f"the {what} cannot be had ({error}): where the network is, `curl -O {address}`, then {option} {name}"
+            ) from error
+    return file
+
+
 def weights_folder(weights: str) -> Path:
     """The folder with config.json and model.safetensors: a local one, or a Hugging Face repository's, downloaded."""
     folder = Path(weights)

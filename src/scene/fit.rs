@@ -1,10 +1,10 @@
 //! Photographs at the network's size, with intrinsics that follow exactly, and the way back to full resolution.
 
-use super::contract::{Contract, Resize};
+use super::framing::{Framing, Resize};
+use super::undistort::{Taps, depth_at};
+use super::{DepthMap, RgbImage};
 use crate::error::Result;
 use crate::geometry::Intrinsics;
-use crate::scene::undistort::{Taps, depth_at};
-use crate::scene::{DepthMap, View};
 use glam::DVec3;
 use image::imageops::{self, FilterType};
 use image::{ImageBuffer, Rgb};
@@ -56,9 +56,9 @@ impl Fit {
     }
 
     /// Colours as the network takes them. `[3][height][width]`
-    pub(crate) fn picture(&self, view: &View, contract: &Contract) -> Vec<f32> {
-        let (width, height) = (view.camera.width, view.camera.height);
-        let bytes = view.image.pixels().as_flattened().to_vec();
+    pub(crate) fn picture(&self, image: &RgbImage, framing: &Framing) -> Vec<f32> {
+        let (width, height) = (image.width(), image.height());
+        let bytes = image.pixels().as_flattened().to_vec();
         let photograph: ImageBuffer<Rgb<u8>, _> =
             ImageBuffer::from_raw(width, height, bytes).expect("three bytes a pixel");
         let filter = if self.resized.0 < width { FilterType::Lanczos3 } else { FilterType::CatmullRom };
@@ -72,7 +72,7 @@ impl Fit {
             for (i, value) in plane.iter_mut().enumerate() {
                 let (u, v) = (i as u32 % w + self.offset[0], i as u32 / w + self.offset[1]);
                 let color = f32::from(resized.get_pixel(u, v).0[c]) / 255.0;
-                *value = (color - contract.mean[c]) / contract.std[c];
+                *value = (color - framing.mean[c]) / framing.std[c];
             }
         }
         out
@@ -90,7 +90,7 @@ impl Fit {
     }
 
     /// Where the centre of a photograph's pixel lies in the network's picture, if it does.
-    fn taps(&self, pixel: usize, width: u32) -> Option<Taps> {
+    pub(super) fn taps(&self, pixel: usize, width: u32) -> Option<Taps> {
         let ([sx, sy], [left, top]) = (self.scale, self.offset.map(f64::from));
         let u = sx * (f64::from(pixel as u32 % width) + 0.5) - left;
         let v = sy * (f64::from(pixel as u32 / width) + 0.5) - top;

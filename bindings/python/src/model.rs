@@ -1,0 +1,87 @@
+//! Networks in ONNX files.
+
+use crate::arrays::owned;
+use crate::camera::Camera;
+use crate::errors::{bad_value, detached, pooled};
+use crate::reconstruct::picture;
+use numpy::PyArray2;
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use vg::onnx::{ModelOptions, Provider};
+use vg::scene::Segmenter;
+use vg::scene::mask::Label;
+
+/// A network in an ONNX file, opened by ONNX Runtime, for reconstruct's prior_model and head_model.
+///
+/// It is opened once and may be used by any number of threads at a time; runs of it take turns. It holds its weights
+/// and threads until nobody refers to it any more. Not for a forked process.
+#[pyclass(module = "vehicle_gaussians", frozen)]
+pub(crate) struct Model {
+    pub(crate) inner: vg::onnx::Model,
+}
+
+#[pymethods]
+impl Model {
+    /// Opens the network in the file at path; weights in files beside it are found by their names.
+    ///
+    /// runtime: ONNX Runtime, the library or its folder; else what the environment variable VG_ONNXRUNTIME names, else
+    /// the one of an installed package onnxruntime. A process has one: the first that was loaded.
+    /// provider: "cpu", or "cuda" for the first CUDA device.
+    /// fall_back: whether the processor steps in where the provider cannot be had.
+    /// threads: of the runtime's own, held as long as the model is open; 0 means one per core.
+    /// prepack: whether weights are rearranged for speed, which can take as much memory again; None: where the files
+    /// take less than 1 GiB.
+    /// arena: whether the runtime keeps the memory of a run for the next one.
+    #[new]
+    #[pyo3(signature = (path, runtime=None, provider="cpu", fall_back=false, threads=0, prepack=None, arena=false))]
+    fn new(
+        py: Python<'_>,
+        path: PathBuf,
+        runtime: Option<PathBuf>,
+        provider: &str,
+        fall_back: bool,
+        threads: usize,
+        prepack: Option<bool>,
+        arena: bool,
+    ) -> PyResult<Self> {
+        let provider = match provider {
+            "cpu" => Provider::Cpu,
+            "cuda" => Provider::Cuda,
+            other => return Err(bad_value(py, "provider", &format!("{other:?}"), "cpu, cuda")),
+        };
+        let options = ModelOptions { runtime, provider, fall_back, threads, prepack, arena };
+        let inner = detached(py, || vg::onnx::Model::open(&path, &options))?;
+        Ok(Self { inner })
+    }
+
+    /// The file.
+    #[getter]
+    fn path(&self) -> PathBuf {
+        self.inner.path().to_owned()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Model({:?})", self.inner.path())
+    }
+}
+
+/// The mask of a photograph that has none, by a segmentation network: bool (height, width), True where the vehicle is
+/// that stands at the origin of the camera's vehicle frame.
+///
+/// image: RGB, uint8 (height, width, 3); with a fourth channel, alpha is not looked at.
+/// threads: worker threads; 0 means one per core.
+#[pyfunction]
+#[pyo3(signature = (model, image, camera, threads=0))]
+pub(crate) fn segment<'py>(
+    py: Python<'py>,
+    model: &Bound<'py, Model>,
+    image: &Bound<'py, PyAny>,
+    camera: &Bound<'py, Camera>,
+    threads: usize,
+) -> PyResult<Bound<'py, PyArray2<bool>>> {
+    let (model, camera) = (model.get().inner.clone(), camera.get().inner);
+    let (image, _) = picture(image, "image", &camera)?;
+    let mask = pooled(py, threads, || Segmenter::new(model)?.mask(&image, &camera))?;
+    let is_vehicle = mask.labels().iter().map(|l| *l == Label::Vehicle).collect();
+    Ok(owned(py, (mask.height() as usize, mask.width() as usize), is_vehicle))
+}
