@@ -142,6 +142,13 @@ fn budget() -> Tries {
         .collect()
 }
 
+/// Seconds, 0 for none, few enough to be tried.
+fn refine_seconds() -> Tries {
+    let good = [0.0f64, -0.0, 1e-9].map(|v| (v.to_bits(), Fine));
+    let bad = [-1.0f64, -5e-324, 86401.0].map(|v| (v.to_bits(), Refused));
+    good.into_iter().chain(bad).chain(finite()).collect()
+}
+
 fn sizes() -> Tries {
     [0, 8193, 1 << 31, u32::MAX].map(|v| (u64::from(v), Refused)).to_vec()
 }
@@ -1060,6 +1067,8 @@ fn figures() -> Lent {
         calibration_lateral_m: elsewhere(),
         uncovered_before: elsewhere(),
         uncovered_after: elsewhere(),
+        refine_iterations: elsewhere(),
+        refine_kept: elsewhere(),
     });
     Lent::zeroed::<vg_report_figures>("vg_report_figures", fields)
 }
@@ -1207,6 +1216,9 @@ fn options(context: usize) -> Lent {
         max_views: [0, 1, 4097, 1 << 60, u64::MAX].map(|n| (n, Fine)).to_vec(),
         prior_model: elsewhere(),
         head_model: elsewhere(),
+        refine_seconds: refine_seconds(),
+        refine_iterations: vec![(0, Fine), (2, Fine), (1_000_001, Refused), (u64::from(u32::MAX), Refused)],
+        refine_hold_out: choice(&[0, 1]),
     });
     let mut lent = Lent::zeroed::<vg_options>("vg_options", fields);
     lent.put("context", 0, context as u64);

@@ -213,6 +213,9 @@ class vg_options(ct.Structure):
         ("max_views", ct.c_size_t),
         ("prior_model", ct.c_void_p),
         ("head_model", ct.c_void_p),
+        ("refine_seconds", ct.c_double),
+        ("refine_iterations", ct.c_uint32),
+        ("refine_hold_out", ct.c_int32),
     )
 
 
@@ -243,6 +246,8 @@ class vg_report_figures(ct.Structure):
         ("calibration_lateral_m", ct.c_double),
         ("uncovered_before", ct.c_double),
         ("uncovered_after", ct.c_double),
+        ("refine_iterations", ct.c_uint32),
+        ("refine_kept", ct.c_uint32),
     )
 
 
@@ -845,6 +850,9 @@ def reconstruct(
     budget: float | None = None,
     resolution: float = 1.0,
     max_views: int | None = None,
+    refine_iterations: int | None = None,
+    refine_seconds: float | None = None,
+    refine_hold_out: bool = False,
     names: Iterable[str] | None = None,
     progress: Callable[[str, float], object] | None = None,
     log: Callable[[LogLevel, str], object] | None = None,
@@ -896,6 +904,17 @@ def reconstruct(
         if max_views < 1:
             raise VgError(Status.ARGUMENT, f"max_views: {max_views}; allowed: at least 1")
         options.max_views = max_views
+    if refine_iterations is not None:
+        # Of C, 0 is none.
+        if not 1 <= refine_iterations < 1 << 32:
+            allowed = "1 to 1000000"
+            raise VgError(Status.ARGUMENT, f"refine_iterations: {refine_iterations}; allowed: {allowed}")
+        options.refine_iterations = refine_iterations
+    if refine_seconds is not None:
+        if refine_seconds == 0:
+            raise VgError(Status.ARGUMENT, f"refine_seconds: {refine_seconds}; allowed: above 0, at most 86400")
+        options.refine_seconds = refine_seconds
+    options.refine_hold_out = refine_hold_out
     if cloud is not None:
         _expect(cloud, "cloud", np.float32)
         if cloud.ndim != 2 or cloud.shape[1] != 3:

@@ -272,6 +272,11 @@ static vg_gaussians *reconstruct(vg_context *context, const vg_view *views, size
     CHECK(options.calibrate == VG_CALIBRATE_AUTO && options.relight == VG_RELIGHT_AUTO && options.photo == 1);
     CHECK(options.budget_s == 0 && options.cloud == NULL && options.cloud_count == 0);
     CHECK(options.resolution == 1 && options.max_views == 0);
+    CHECK(options.refine_seconds == 0 && options.refine_iterations == 0 && options.refine_hold_out == 0);
+    options.refine_seconds = 1;
+    options.refine_iterations = 2;
+    FAILS(vg_reconstruct(views, count, &options, &again, NULL, &error), VG_STATUS_ARGUMENT, "options.refine_seconds: 1");
+    options.refine_seconds = 0;
     options.resolution = 1.5;
     FAILS(vg_reconstruct(views, count, &options, &again, NULL, &error), VG_STATUS_ARGUMENT, "options.resolution: 1.5");
     options.resolution = 1;
@@ -290,6 +295,7 @@ static vg_gaussians *reconstruct(vg_context *context, const vg_view *views, size
         DO(vg_report_get_figures(report, &figures, &error));
         CHECK(figures.prior == VG_PRIOR_SHAPE && figures.calibration == VG_CALIBRATION_NONE && figures.has_uncovered);
         CHECK(figures.uncovered_after <= figures.uncovered_before && figures.uncovered_before < 0.2);
+        CHECK(figures.refine_iterations == 2 && figures.refine_kept <= 2);
         CHECK(figures.relit_count == 0 && figures.photo_found == 0 && figures.cloud_used <= 1);
         vg_report_free(report);
         vg_gaussians_free(again);
