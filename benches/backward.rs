@@ -17,7 +17,8 @@ use common::{Random, scenes};
 use glam::DVec3;
 use std::time::{Duration, Instant};
 use vg::render::cpu::GradientTimes;
-use vg::render::{CpuRenderer, Gradients, PictureGradient, RenderOptions, Rendered};
+use vg::render::loss::{self, Term};
+use vg::render::{CpuRenderer, Gradients, PictureGradient, RenderOptions, Rendered, Renderer};
 use vg::{Camera, Gaussians};
 
 const RUNS: usize = 40;
@@ -32,13 +33,41 @@ fn main() {
         "{:18} {:>7} {:>8} {:>11} {:>8} {:>11} {:>8}",
         "scene", "threads", "", "wall median", "min", "CPU median", "min"
     );
-    for (name, gaussians) in [("car, 200,000", scenes::surfel_car(200_000)), ("dense, 30,000", dense(30_000))] {
+    for (name, gaussians) in [("car, 200,000", scenes::surfel_car(200_000)), ("dense, 30,000", dense(30_000))]
+    {
         let gradients =
             [1, 2].map(|threads| time(name, &renderer, &gaussians, &camera, threads, has("--stages")));
         assert!(gradients[0] == gradients[1], "1 and 2 threads give different gradients");
     }
     println!("1 and 2 threads gave the same bytes");
+    time_losses(&renderer.render(&scenes::surfel_car(20_000), &camera, &RenderOptions::default()).unwrap());
 }
+
+/// Each loss term on its own, in the pool of all processors.
+fn time_losses(picture: &Rendered) {
+    let target: Vec<[f32; 3]> = picture.color.iter().map(|c| c.map(|v| 0.9 * v + 0.05)).collect();
+    let term = Term::weighing(1.0);
+    let mut gradient = PictureGradient::default();
+    let terms: [(&str, Loss); 4] = [
+        ("l1", &|g| loss::l1(picture, &target, term, g)),
+        ("dissimilarity", &|g| loss::dissimilarity(picture, &target, term, g)),
+        ("silhouette", &|g| loss::silhouette(picture, &picture.depth, term, g)),
+        ("depth_l1", &|g| loss::depth_l1(picture, &picture.alpha, term, g)),
+    ];
+    for (name, term) in terms {
+        let row = clock(|| {
+            gradient.reset(picture);
+            term(&mut gradient).unwrap();
+        });
+        println!(
+            "{name:18} wall {:.2} ms, min {:.2}; CPU {:.2} ms, min {:.2}",
+            row[0], row[1], row[2], row[3]
+        );
+    }
+}
+
+/// A term of one picture, added to a gradient.
+type Loss<'a> = &'a dyn Fn(&mut PictureGradient) -> vg::Result<f64>;
 
 /// Blobs of 1 to 10 cm through the whole box of a car: many layers per pixel, none of them opaque.
 fn dense(n: usize) -> Gaussians {

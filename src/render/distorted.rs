@@ -19,6 +19,9 @@ use rayon::prelude::*;
 /// standard deviation is sqrt(0.3) pixels, to 10 %; its centroid and its sum exactly.
 pub const SUPERSAMPLING: f64 = 2.0;
 
+/// Of a gradient's entries when it is scattered.
+const LARGEST: f32 = 1e34;
+
 /// Largest blur the options accept, pixels^2.
 const MAX_BLUR: f32 = 100.0;
 
@@ -148,6 +151,9 @@ impl LensMap {
             if position[0].is_nan() {
                 continue;
             }
+            // A gradient near the end of f32 saturates: the sums of its neighbours stay finite.
+            let (alpha, depth) = (alpha.clamp(-LARGEST, LARGEST), depth.clamp(-LARGEST, LARGEST));
+            let color = color.map(|v| v.clamp(-LARGEST, LARGEST));
             let taps = Taps::new(*position, width, height);
             for (at, weight) in taps.index.into_iter().zip(taps.weights()) {
                 for c in 0..3 {

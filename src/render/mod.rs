@@ -3,6 +3,7 @@
 pub mod cpu;
 pub mod distorted;
 pub mod gradient;
+pub mod loss;
 pub mod options;
 pub mod output;
 pub mod reference;

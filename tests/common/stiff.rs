@@ -24,9 +24,9 @@ pub fn stiff(seed: u64) -> Stiff {
             0 => Background::Transparent,
             _ => Background::Color([0; 3].map(|_| r.uniform(0.0, 1.0) as f32)),
         },
-        antialiased: seed % 3 == 0,
-        blur: if seed % 7 == 0 { 0.1 } else { 0.3 },
-        max_alpha: if seed % 2 == 0 { 0.99 } else { 0.999 },
+        antialiased: seed.is_multiple_of(3),
+        blur: if seed.is_multiple_of(7) { 0.1 } else { 0.3 },
+        max_alpha: if seed.is_multiple_of(2) { 0.99 } else { 0.999 },
         sh_degree: if seed % 6 == 1 { 1 } else { 3 },
         depth_mode: if seed % 4 < 2 { DepthMode::Accumulated } else { DepthMode::Expected },
         ..RenderOptions::default()

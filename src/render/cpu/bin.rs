@@ -231,3 +231,38 @@ pub(super) fn stripe_of(stripes: &[Stripe], row: usize) -> &Stripe {
     let i = stripes.partition_point(|s| s.rows.end <= row);
     &stripes[i]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_hold_every_tile_once_in_order_and_no_more_pairs_than_allowed() {
+        let grid = Grid::new(300, 100);
+        let at = |i: usize, k: usize, n: usize| ((i * 7919 + k * 104_729) % 1009 % n) as u16;
+        let bounds: Vec<PixelBounds> = (0..500)
+            .map(|i| {
+                let (x0, y0) = (at(i, 0, 300), at(i, 1, 100));
+                let (x1, y1) = ((x0 + at(i, 2, 150)).min(299), (y0 + at(i, 3, 40)).min(99));
+                PixelBounds { x0, x1, y0, y1 }
+            })
+            .collect();
+        let mut pairs = vec![0; grid.rows * grid.columns];
+        for b in &bounds {
+            for row in tile_rows(b) {
+                tile_columns(b).for_each(|column| pairs[row * grid.columns + column] += 1);
+            }
+        }
+        for budget in [1, 100, 400, 1000, 5000, 1_000_000] {
+            let windows = windows(grid, &bounds, budget);
+            let mut seen = Vec::new();
+            for Window { columns, rows } in windows {
+                let before = seen.len();
+                rows.for_each(|r| seen.extend(columns.clone().map(|c| r * grid.columns + c)));
+                let held: u64 = seen[before..].iter().map(|&tile| pairs[tile]).sum();
+                assert!(held <= budget || seen.len() == before + 1, "{held} of {budget}");
+            }
+            assert_eq!(seen, (0..pairs.len()).collect::<Vec<usize>>(), "{budget}");
+        }
+    }
+}

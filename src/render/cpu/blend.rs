@@ -17,6 +17,9 @@ const BATCH: usize = 32;
 
 /// Told of everything that is drawn, in order; the picture alone needs none of it.
 pub(super) trait Record {
+    /// Whether the tile's colour is wanted; its transmittance and depth are there always.
+    const COLOR: bool;
+
     /// Eight rows of a splat follow: at most 64 blocks.
     fn rows(&mut self);
 
@@ -32,6 +35,8 @@ pub(super) trait Record {
 pub(super) struct Forget;
 
 impl Record for Forget {
+    const COLOR: bool = true;
+
     #[inline(always)]
     fn rows(&mut self) {}
 
@@ -44,14 +49,14 @@ impl Record for Forget {
 
 /// Blends the splats that `list` names, nearest first, into the tile whose first pixel is `origin`.
 #[inline(always)]
-pub(super) fn blend<S: Lanes>(
+pub(super) fn blend<S: Lanes, R: Record>(
     simd: S,
     tile: &mut Tile,
     origin: [usize; 2],
     list: &[Entry],
     splats: &[Splat],
     max_alpha: f32,
-    record: &mut impl Record,
+    record: &mut R,
 ) {
     let x = block_centers(origin[0]);
     let mut entries = [Entry::default(); BATCH];
@@ -114,7 +119,7 @@ struct Footprint {
 }
 
 #[inline(always)]
-fn blend_splat<S: Lanes>(
+fn blend_splat<S: Lanes, R: Record>(
     simd: S,
     tile: &mut Tile,
     [left, top]: [usize; 2],
@@ -122,7 +127,7 @@ fn blend_splat<S: Lanes>(
     entry: Entry,
     splat: &Splat,
     max_alpha: f32,
-    record: &mut impl Record,
+    record: &mut R,
 ) {
     let [first_row, last_row] = entry.rows();
     let footprint = Footprint::new(simd, splat);
@@ -151,7 +156,7 @@ fn blend_splat<S: Lanes>(
             let alpha = simd.min_f32s(alpha, max_alpha);
             let block = &mut tile.blocks[row * BLOCKS + i];
             let t = block.transmittance;
-            let drawn = composite(simd, block, alpha, color, depth);
+            let drawn = composite::<S, R>(simd, block, alpha, color, depth);
             record.block(simd, row * BLOCKS + i, drawn, t);
             if simd.sign_bits(block.transmittance) == 0xff {
                 tile.live[row + r] &= !(1 << at);
@@ -262,7 +267,13 @@ fn block_of<S: Lanes>(simd: S, x: f32x8) -> pulp::u32x8 {
 /// C += T alpha colour, D += T alpha z, T *= 1 - alpha where alpha counts and the pixel is not finished by it.
 /// Returns alpha where it was drawn, else 0.
 #[inline(always)]
-fn composite<S: Lanes>(simd: S, block: &mut Block, alpha: f32x8, color: [f32x8; 3], depth: f32x8) -> f32x8 {
+fn composite<S: Lanes, R: Record>(
+    simd: S,
+    block: &mut Block,
+    alpha: f32x8,
+    color: [f32x8; 3],
+    depth: f32x8,
+) -> f32x8 {
     let t = block.transmittance;
     let next = simd.mul_f32s(t, simd.sub_f32s(simd.splat_f32s(1.0), alpha));
     // False for a NaN, which a form that has overflowed may give.
@@ -272,8 +283,10 @@ fn composite<S: Lanes>(simd: S, block: &mut Block, alpha: f32x8, color: [f32x8; 
     let drawn = simd.and_m32s(counts, open);
 
     let weight = simd.select_f32s(drawn, simd.mul_f32s(t, alpha), simd.splat_f32s(0.0));
-    for c in 0..3 {
-        block.color[c] = simd.mul_add(weight, color[c], block.color[c]);
+    if R::COLOR {
+        for c in 0..3 {
+            block.color[c] = simd.mul_add(weight, color[c], block.color[c]);
+        }
     }
     block.depth = simd.mul_add(weight, depth, block.depth);
     let closed = simd.select_f32s(counts, simd.or_f32s(t, simd.splat_f32s(-0.0)), t);

@@ -118,23 +118,13 @@ fn both_ways<S: Lanes>(
     loss: impl FnOnce(&Rendered, &mut PictureGradient) -> Result<f32>,
 ) -> Result<GradientTimes> {
     let mut forward = super::prepare(simd, gaussians, camera, options, scratch);
-    let binned =
-        super::blend_in_slices(simd, camera, options, pair_budget, scratch, picture, &mut forward);
+    let binned = super::blend_in_slices(simd, camera, options, pair_budget, scratch, picture, &mut forward);
     let start = Instant::now();
     let largest = loss(picture, of_picture)?;
     let loss = start.elapsed();
     let given = (&*of_picture, largest);
-    let backward = backward::backward(
-        simd,
-        gaussians,
-        camera,
-        options,
-        pair_budget,
-        scratch,
-        binned,
-        given,
-        gradients,
-    );
+    let backward =
+        backward::backward(simd, gaussians, camera, options, pair_budget, scratch, binned, given, gradients);
     Ok(GradientTimes { forward, loss, backward })
 }
 
@@ -183,4 +173,41 @@ fn back<S: Lanes>(
 ) {
     super::prepare(simd, gaussians, camera, options, scratch);
     backward::backward(simd, gaussians, camera, options, pair_budget, scratch, false, gradient, out);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Pose;
+    use crate::geometry::camera::Intrinsics;
+
+    #[test]
+    fn pair_budgets_of_any_size_give_the_same_bytes() {
+        let n = 300;
+        let at = |i: usize, k: usize| ((i * 7919 + k * 104_729) % 1000) as f32 / 1000.0 - 0.5;
+        let means = (0..n).map(|i| [3.0 * at(i, 0), 2.0 * at(i, 1), 4.0 + at(i, 2)]).collect();
+        let rotations = (0..n).map(|i| [at(i, 3), at(i, 4), at(i, 5), 1.0]).collect();
+        let scales = (0..n).map(|i| [0.4, 0.02, 0.1 + 0.1 * at(i, 6)]).collect();
+        let opacities = (0..n).map(|i| 0.5 + at(i, 7)).collect();
+        let sh = (0..3 * n).map(|i| at(i, 8)).collect();
+        let gaussians = Gaussians::from_arrays(0, means, rotations, scales, opacities, sh).unwrap();
+        let intrinsics = Intrinsics { fx: 150.0, fy: 150.0, cx: 90.0, cy: 40.0 };
+        let camera = Camera::pinhole(190, 90, intrinsics, Pose::IDENTITY).unwrap();
+        let mut gradient = PictureGradient::zeros(190, 90);
+        for i in 0..190 * 90 {
+            (gradient.color[i], gradient.alpha[i]) = ([at(i, 1), at(i, 2), at(i, 3)], at(i, 4));
+            gradient.depth[i] = at(i, 5);
+        }
+        let options = RenderOptions::default();
+        let expected = CpuRenderer::new().backward(&gaussians, &camera, &options, &gradient).unwrap();
+        assert!(expected.means.iter().filter(|m| **m != [0.0; 3]).count() > 100);
+        for pair_budget in [1, 50, 200, 800] {
+            let renderer = CpuRenderer { pair_budget, ..CpuRenderer::new() };
+            let loss = |_: &Rendered| Ok(gradient.clone());
+            let found = renderer.render_with_gradients(&gaussians, &camera, &options, loss).unwrap().1;
+            assert!(found == expected, "{pair_budget} pairs, with the picture");
+            let found = renderer.backward(&gaussians, &camera, &options, &gradient).unwrap();
+            assert!(found == expected, "{pair_budget} pairs");
+        }
+    }
 }

@@ -165,6 +165,6 @@ pub(super) fn lanes(v: &f32x8) -> &[f32; BLOCK] {
     bytemuck::cast_ref(v)
 }
 
-pub(super) fn lanes_mut(v: &mut f32x8) -> &mut [f32; BLOCK] {
+fn lanes_mut(v: &mut f32x8) -> &mut [f32; BLOCK] {
     bytemuck::cast_mut(v)
 }

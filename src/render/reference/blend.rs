@@ -97,7 +97,10 @@ impl Sums {
     }
 }
 
-fn assemble(of: &Parameters, pixel: impl Fn(usize) -> ([f64; 3], f64, f64) + Sync + Send) -> ReferencePicture {
+fn assemble(
+    of: &Parameters,
+    pixel: impl Fn(usize) -> ([f64; 3], f64, f64) + Sync + Send,
+) -> ReferencePicture {
     let (width, height) = (of.width as usize, of.height as usize);
     let pixels: Vec<([f64; 3], f64, f64)> =
         (0..width * height).into_par_iter().with_min_len(width.min(64)).map(pixel).collect();

@@ -4,12 +4,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// What a formula needs of a number.
 pub(super) trait Number:
-    Copy
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
     fn constant(v: f64) -> Self;
     fn value(self) -> f64;

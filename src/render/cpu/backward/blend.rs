@@ -1,8 +1,8 @@
 //! Blending backwards: one tile's tape, from the farthest layer to the nearest.
 //!
-//! Every output of a pixel is a sum over its layers, `sum_k T_k alpha_k f_k + T_end f_end`, with f the colour, z, or
-//! 1. Weighted by the picture's gradient they are one sum of `phi_k = gc . c_k + gd z_k` with
-//! `phi_end = gc . background - ga`, so with what is behind composited from the back,
+//! Every output of a pixel is a sum over its layers, `sum_k T_k alpha_k f_k + T_end f_end`, with f the colour, z or 1.
+//! Weighted by the picture's gradient (gc, ga, gd) they are one sum, of `phi_k = gc . c_k + gd z_k` before
+//! `phi_end = gc . background - ga`. With S_k what is seen of it from layer k on, composited from the back,
 //!
 //! ```text
 //! S_k = alpha_k phi_k + (1 - alpha_k) S_{k+1},   S_end = phi_end
@@ -15,7 +15,7 @@
 use super::super::blend::block_centers;
 use super::super::simd::Lanes;
 use super::super::splat::Splat;
-use super::super::tile::{BLOCK, BLOCKS, TILE_HEIGHT, TILE_WIDTH, Tile, lanes, lanes_mut};
+use super::super::tile::{BLOCK, BLOCKS, TILE_HEIGHT, TILE_WIDTH, Tile, lanes};
 use super::tape::Tape;
 use crate::render::{Background, DepthMode, PictureGradient, RenderOptions};
 use pulp::f32x8;
@@ -53,15 +53,16 @@ impl TileGradient {
         Self { blocks: [Behind { color: [ZERO; 3], depth: ZERO, sum: ZERO }; BLOCKS * TILE_HEIGHT] }
     }
 
-    /// Starts behind the last layer of `tile`, which has been blended, with `scale` times the picture's gradient.
+    /// Starts behind the last layer of `tile`, which has been blended onto `tape`, with `scale` times the picture's gradient.
     /// Returns the gradient of the background's colour.
+    #[inline(always)]
     pub(super) fn start(
         &mut self,
-        tile: &Tile,
+        (tile, tape): (&Tile, &Tape),
         [left, top]: [usize; 2],
         options: &RenderOptions,
         gradient: &PictureGradient,
-        scale: f32,
+        scale: f64,
     ) -> [f64; 3] {
         let behind = match options.background {
             Background::Color(rgb) => rgb,
@@ -69,36 +70,53 @@ impl TileGradient {
         };
         let (width, height) = (gradient.width as usize, gradient.height as usize);
         let (rows, columns) = ((height - top).min(TILE_HEIGHT), (width - left).min(TILE_WIDTH));
-        self.blocks.fill(Behind { color: [ZERO; 3], depth: ZERO, sum: ZERO });
+        let expected = options.depth_mode == DepthMode::Expected;
         let mut background = [0.0; 3];
-        for r in 0..rows {
-            for x in 0..columns {
-                let (at, l) = (r * BLOCKS + x / BLOCK, x % BLOCK);
-                let i = (top + r) * width + left + x;
-                let t = lanes(&tile.blocks[at].transmittance)[l].abs();
-                let block = &mut self.blocks[at];
-                let mut sum = 0.0;
-                if let Some(gc) = gradient.color.get(i) {
+        for r in 0..TILE_HEIGHT {
+            for b in 0..BLOCKS {
+                let (at, x0) = (r * BLOCKS + b, b * BLOCK);
+                let inside = if r < rows { columns.saturating_sub(x0).min(BLOCK) } else { 0 };
+                let first = (top + r) * width + left + x0;
+                let t = lanes(&tile.blocks[at].transmittance);
+                let (mut color, mut depth, mut sum) = ([[0.0; BLOCK]; 3], [0.0; BLOCK], [0.0; BLOCK]);
+                if inside > 0 && !gradient.color.is_empty() {
+                    let mut total = [0.0; 3];
+                    for (l, gc) in gradient.color[first..first + inside].iter().enumerate() {
+                        for c in 0..3 {
+                            color[c][l] = (scale * f64::from(gc[c])) as f32;
+                            sum[l] += color[c][l] * behind[c];
+                            total[c] += color[c][l] * t[l].abs();
+                        }
+                    }
                     for c in 0..3 {
-                        let g = scale * gc[c];
-                        lanes_mut(&mut block.color[c])[l] = g;
-                        sum += g * behind[c];
-                        background[c] += f64::from(g) * f64::from(t);
+                        background[c] += f64::from(total[c]);
                     }
                 }
-                if let Some(ga) = gradient.alpha.get(i) {
-                    sum -= scale * ga;
-                }
-                if let Some(gd) = gradient.depth.get(i) {
-                    let mut g = scale * gd;
-                    if options.depth_mode == DepthMode::Expected {
-                        let alpha = 1.0 - t;
-                        g = if alpha > 0.0 { g / alpha } else { 0.0 };
-                        sum += if alpha > 0.0 { g * (lanes(&tile.blocks[at].depth)[l] / alpha) } else { 0.0 };
+                if inside > 0 && !gradient.alpha.is_empty() {
+                    for (l, ga) in gradient.alpha[first..first + inside].iter().enumerate() {
+                        sum[l] -= (scale * f64::from(*ga)) as f32;
                     }
-                    lanes_mut(&mut block.depth)[l] = g;
                 }
-                lanes_mut(&mut block.sum)[l] = sum;
+                if inside > 0 && !gradient.depth.is_empty() {
+                    for (l, gd) in gradient.depth[first..first + inside].iter().enumerate() {
+                        depth[l] = (scale * f64::from(*gd)) as f32;
+                    }
+                    if expected {
+                        let covered = lanes(&tape.covered()[at]);
+                        let total = lanes(&tile.blocks[at].depth);
+                        for l in 0..BLOCK {
+                            let alpha = covered[l];
+                            let inverse = if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
+                            depth[l] *= inverse;
+                            sum[l] += depth[l] * (total[l] * inverse);
+                        }
+                    }
+                }
+                self.blocks[at] = Behind {
+                    color: [pulp::cast(color[0]), pulp::cast(color[1]), pulp::cast(color[2])],
+                    depth: pulp::cast(depth),
+                    sum: pulp::cast(sum),
+                };
             }
         }
         if options.background == Background::Transparent { [0.0; 3] } else { background }
@@ -157,8 +175,7 @@ impl TileGradient {
                 let weight = simd.mul_f32s(drawn.transmittance, alpha);
                 let w = simd.mul_f32s(weight, simd.sub_f32s(phi, behind.sum));
                 let w = simd.select_f32s(simd.less_than_f32s(alpha, max_alpha), w, ZERO);
-                behind.sum =
-                    simd.mul_add(simd.sub_f32s(one, alpha), behind.sum, simd.mul_f32s(alpha, phi));
+                behind.sum = simd.mul_add(simd.sub_f32s(one, alpha), behind.sum, simd.mul_f32s(alpha, phi));
 
                 let (wt, ws) = (simd.mul_f32s(w, t), simd.mul_f32s(w, s));
                 sum[0] = simd.add_f32s(sum[0], w);
@@ -215,13 +232,7 @@ impl Form {
         }
         let (center, center_rest) = (s.center, s.center_rest);
         if s.conditional < 0.0 {
-            Self {
-                center,
-                center_rest,
-                slope: [-s.slope, 1.0],
-                whiten_t: t,
-                whiten_s: [marginal, 0.0],
-            }
+            Self { center, center_rest, slope: [-s.slope, 1.0], whiten_t: t, whiten_s: [marginal, 0.0] }
         } else {
             Self { center, center_rest, slope: [1.0, -s.slope], whiten_t: t, whiten_s: [0.0, marginal] }
         }

@@ -32,7 +32,7 @@ const PAIR_BUDGET: u64 = 1 << 22;
 
 /// The picture's gradient is brought to this magnitude, exactly, by a power of two: with colours of at most 1e30 and
 /// 8192 x 8192 pixels no sum leaves f32, and entries 1e-30 of the largest still count.
-const LARGEST: f32 = 1.0 / (1 << 24) as f32;
+const LARGEST: f64 = 1.0 / (1 << 24) as f64;
 
 /// Wall time of each stage of one backward pass.
 #[derive(Clone, Copy, Debug, Default)]
@@ -84,7 +84,7 @@ pub(super) fn backward<S: Lanes>(
     (gradient, largest): (&PictureGradient, f32),
     out: &mut Gradients,
 ) -> BackwardTimes {
-    let scale = power_of_two(LARGEST / largest);
+    let scale = scale_of(largest);
     let view = PinholeView::new(camera, options, gaussians.sh_degree());
     let grid = Grid::new(camera.width, camera.height);
     let Scratch { splats, order, bounds, stripes, backward, .. } = scratch;
@@ -114,7 +114,7 @@ pub(super) fn backward<S: Lanes>(
     }
 
     let start = Instant::now();
-    let unscale = 1.0 / f64::from(scale);
+    let unscale = 1.0 / scale;
     let total = project_all(simd, &view, gaussians, splats, sums, unscale, out);
     out.background = background.map(|v| v * unscale);
     out.pose = pose_gradient(camera, &total);
@@ -122,9 +122,10 @@ pub(super) fn backward<S: Lanes>(
     times
 }
 
-/// The power of two next below `v`, kept to where its inverse is normal too; `v` may be infinite.
-fn power_of_two(v: f32) -> f32 {
-    f32::from_bits(v.clamp(1e-37, 1e37).to_bits() & 0xff80_0000)
+/// The power of two that brings `largest` to about [`LARGEST`].
+fn scale_of(largest: f32) -> f64 {
+    let ratio = if largest > 0.0 { LARGEST / f64::from(largest) } else { 1.0 };
+    f64::from_bits(ratio.to_bits() & 0xfff0_0000_0000_0000)
 }
 
 /// Replays every tile of `window` and walks it back.
@@ -135,7 +136,7 @@ fn walk_tiles<S: Lanes>(
     splats: &[Splat],
     options: &RenderOptions,
     gradient: &PictureGradient,
-    scale: f32,
+    scale: f64,
     workers: &Mutex<Vec<Box<Worker>>>,
     tiles: &mut Vec<TileShare>,
 ) {
@@ -158,7 +159,10 @@ fn walk_tiles<S: Lanes>(
             #[inline(always)]
             || super::blend::blend(simd, tile, origin, list, splats, options.max_alpha, tape),
         );
-        *background = behind.start(tile, origin, options, gradient, scale);
+        *background = simd.vectorize(
+            #[inline(always)]
+            || behind.start((tile, tape), origin, options, gradient, scale),
+        );
         simd.vectorize(
             #[inline(always)]
             || behind.walk(simd, tape, origin, splats, options.max_alpha, ids, sums),
@@ -169,7 +173,7 @@ fn walk_tiles<S: Lanes>(
 
 impl Worker {
     fn new() -> Box<Self> {
-        Box::new(Self { tile: Tile::new(), tape: Tape::default(), gradient: TileGradient::new() })
+        Box::new(Self { tile: Tile::new(), tape: Tape::new(), gradient: TileGradient::new() })
     }
 }
 

@@ -23,7 +23,7 @@ use super::super::splat::Splat;
 use super::super::view::PinholeView;
 use super::blend::SplatSums;
 use super::color::backward as color_backward;
-use crate::gaussians::{Gaussians, sh};
+use crate::gaussians::{self, Gaussians};
 use crate::render::gradient::narrow;
 use crate::render::options::MIN_COMPENSATION;
 
@@ -53,14 +53,10 @@ pub(super) fn project(
     unscale: f64,
     out: Chunk,
 ) -> CameraSums {
-    out.means.fill([0.0; 3]);
-    out.rotations.fill([0.0; 4]);
-    out.scales.fill([0.0; 3]);
-    out.opacities.fill(0.0);
-    out.sh.fill(0.0);
+    let Chunk { first, means, rotations, scales, opacities, sh } = out;
     let stride = gaussians.sh_stride();
-    let coefficients = sh::coefficients(view.sh_degree);
-    let n = out.opacities.len();
+    let coefficients = gaussians::sh::coefficients(view.sh_degree);
+    let n = opacities.len();
     let mut camera = [0.0; 15];
     let mut next = 0;
     while next < n {
@@ -68,7 +64,13 @@ pub(super) fn project(
         let mut index = [0; LANES];
         let mut count = 0;
         while next < n && count < LANES {
-            if sums[next] != [0.0; 10] {
+            if sums[next] == [0.0; 10] {
+                means[next] = [0.0; 3];
+                rotations[next] = [0.0; 4];
+                scales[next] = [0.0; 3];
+                opacities[next] = 0.0;
+                sh[next * stride..(next + 1) * stride].fill(0.0);
+            } else {
                 index[count] = next;
                 count += 1;
             }
@@ -81,7 +83,7 @@ pub(super) fn project(
         let mut upstream = [[0.0; LANES]; 10];
         for l in 0..LANES {
             let i = index[l.min(count - 1)];
-            lanes.load(l, gaussians, out.first + i);
+            lanes.load(l, gaussians, first + i);
             for k in 0..10 {
                 upstream[k][l] = f64::from(sums[i][k]);
             }
@@ -95,9 +97,10 @@ pub(super) fn project(
             let mut mean = [g.mean[0][l], g.mean[1][l], g.mean[2][l]];
             let color = [upstream[6][l], upstream[7][l], upstream[8][l]];
             let direction = [g.direction[0][l], g.direction[1][l], g.direction[2][l]];
-            let splat = &splats[out.first + i];
-            let coefficients_in = &gaussians.sh()[(out.first + i) * stride..][..3 * coefficients];
-            let coefficients_out = &mut out.sh[i * stride..][..3 * coefficients];
+            let splat = &splats[first + i];
+            let coefficients_in = &gaussians.sh()[(first + i) * stride..][..3 * coefficients];
+            let (coefficients_out, unused) = sh[i * stride..(i + 1) * stride].split_at_mut(3 * coefficients);
+            unused.fill(0.0);
             let turn = color_backward(
                 coefficients_in,
                 direction,
@@ -116,13 +119,13 @@ pub(super) fn project(
                 camera[k] += g.camera[k][l];
             }
             for k in 0..3 {
-                out.means[i][k] = narrow(unscale * mean[k]);
-                out.scales[i][k] = narrow(unscale * g.scale[k][l]);
+                means[i][k] = narrow(unscale * mean[k]);
+                scales[i][k] = narrow(unscale * g.scale[k][l]);
             }
             for k in 0..4 {
-                out.rotations[i][k] = narrow(unscale * g.rotation[k][l]);
+                rotations[i][k] = narrow(unscale * g.rotation[k][l]);
             }
-            out.opacities[i] = narrow(unscale * g.opacity[l]);
+            opacities[i] = narrow(unscale * g.opacity[l]);
         }
     }
     for v in &mut camera {
@@ -146,13 +149,7 @@ struct Outputs {
 
 /// One lane, without branches or closures, so that the compiler turns the loop over lanes into vectors.
 #[inline(always)]
-fn project_lane(
-    view: &PinholeView,
-    g: &Inputs,
-    upstream: &[[f64; LANES]; 10],
-    out: &mut Outputs,
-    l: usize,
-) {
+fn project_lane(view: &PinholeView, g: &Inputs, upstream: &[[f64; LANES]; 10], out: &mut Outputs, l: usize) {
     // Forward once more, with the same formulas as `project`.
     let w = f64::from(g.rotation[0][l]);
     let qx = f64::from(g.rotation[1][l]);
@@ -211,8 +208,7 @@ fn project_lane(
     let inverse_residual = inverse_t / c;
     for k in 0..3 {
         let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-        let (p_i, p_j, p_k) =
-            if pivot_x { (pa[i], pa[j], pa[k]) } else { (pb[i], pb[j], pb[k]) };
+        let (p_i, p_j, p_k) = if pivot_x { (pa[i], pa[j], pa[k]) } else { (pb[i], pb[j], pb[k]) };
         let o_k = if pivot_x { pb[k] } else { pa[k] };
         h_t[k] = (sign * (s2[i] * p_i * n[j] - s2[j] * p_j * n[i]) + e * o_k) * inverse_residual;
         h_s[k] = p_k * inverse_s;

@@ -7,6 +7,7 @@
 
 use super::super::blend::Record;
 use super::super::simd::Lanes;
+use super::super::tile::{BLOCKS, TILE_HEIGHT};
 use pulp::f32x8;
 
 /// Blocks that are drawn between two calls of [`Record::rows`].
@@ -32,7 +33,7 @@ pub(super) struct Layer {
 }
 
 /// One tile's tape, reused from tile to tile.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Tape {
     /// The first `len` are written; the rest is room.
     drawn: Vec<Drawn>,
@@ -40,12 +41,32 @@ pub(super) struct Tape {
     blocks: Vec<u8>,
     len: usize,
     layers: Vec<Layer>,
+    /// Sum of T alpha of each block: alpha to the last bit, which 1 - T is not where little is drawn (1.5e-5 of 1/255).
+    covered: [f32x8; BLOCKS * TILE_HEIGHT],
 }
 
+const ZERO: f32x8 = f32x8(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+
 impl Tape {
+    pub(super) fn new() -> Self {
+        Self {
+            drawn: Vec::new(),
+            blocks: Vec::new(),
+            len: 0,
+            layers: Vec::new(),
+            covered: [ZERO; BLOCKS * TILE_HEIGHT],
+        }
+    }
+
     pub(super) fn clear(&mut self) {
         self.len = 0;
         self.layers.clear();
+        self.covered.fill(ZERO);
+    }
+
+    /// Alpha of each block's pixels.
+    pub(super) fn covered(&self) -> &[f32x8; BLOCKS * TILE_HEIGHT] {
+        &self.covered
     }
 
     pub(super) fn layers(&self) -> &[Layer] {
@@ -62,19 +83,21 @@ impl Tape {
 }
 
 impl Record for Tape {
+    const COLOR: bool = false;
+
     #[inline(always)]
     fn rows(&mut self) {
         let needed = self.len + MOST_PER_CALL;
         if needed > self.drawn.len() {
-            let zero = pulp::cast([0f32; 8]);
             let size = needed.max(2 * self.drawn.len());
-            self.drawn.resize(size, Drawn { alpha: zero, transmittance: zero });
+            self.drawn.resize(size, Drawn { alpha: ZERO, transmittance: ZERO });
             self.blocks.resize(size, 0);
         }
     }
 
     #[inline(always)]
     fn block<S: Lanes>(&mut self, simd: S, block: usize, alpha: f32x8, t: f32x8) {
+        self.covered[block] = simd.mul_add(alpha, t, self.covered[block]);
         // Written always and kept where a lane drew: no branch to mispredict.
         self.drawn[self.len] = Drawn { alpha, transmittance: t };
         self.blocks[self.len] = block as u8;
