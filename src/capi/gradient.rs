@@ -388,7 +388,7 @@ impl Arrays {
 unsafe fn write<T: Copy>(to: *mut T, values: &[T]) {
     if !to.is_null() {
         unsafe {
-            std::ptr::copy_nonoverlapping(values.as_ptr().cast::<u8>(), to.cast(), size_of_val(values))
+            std::ptr::copy_nonoverlapping(values.as_ptr().cast::<u8>(), to.cast(), size_of_val(values));
         };
     }
 }
