@@ -43,6 +43,9 @@
  *            premultiplied; opaque ones have alpha 1. 8-bit values are rounded and clamped; RGBA32F is not clamped
  *            above 1.
  *
+ * Gradients. Of one scalar, a loss, with respect to the number as the library holds it: float32 for pictures and
+ *            Gaussians, laid out as they are, double for camera and background. vg_render_backward.
+ *
  * Ownership. Whoever receives a handle through an out parameter frees it with the matching _free function, which
  *            accepts NULL. Pointers that a function returns are borrowed: they live as long as the handle they were
  *            asked of. transform, mirror and merge return new handles. No struct owns what it points to.
@@ -62,7 +65,7 @@
  *
  * Errors.    Functions that can fail return a vg_status and, through out_error, an object with a message: which
  *            argument, what was found, what is allowed. On failure, out handles are NULL, and everything the caller
- *            owns is as it was. out_error may be NULL. A bug in the library is a status too; it neither aborts nor
+ *            owns is as it was, but for a picture that a vg_loss_fn was shown. out_error may be NULL. A bug in the library is a status too; it neither aborts nor
  *            throws. Running out of memory aborts, as it does in most programs.
  *
  * Same bytes. The same input and the same options give the same bytes, with any number of threads, on the same
@@ -957,6 +960,20 @@ typedef struct vg_options {
      * The network that makes Gaussians of pixels. Default NULL: none; each pixel becomes a disc on the surface.
      */
     const struct vg_model *head_model;
+    /**
+     * Seconds, about, for optimising the model against the photographs, above 0: a number of steps is found that fits,
+     * and `vg_report_figures.refine_iterations` tells it. In addition to `budget_s`. 0: none. Default 0.
+     */
+    double refine_seconds;
+    /**
+     * The same as a number of steps, at most 1000000, which the same input answers with the same bytes; not with
+     * `refine_seconds`. 0: none. Default 0.
+     */
+    uint32_t refine_iterations;
+    /**
+     * 1: one of three or more views takes no part in the optimisation and tells when to stop; 0: all do. Default 0.
+     */
+    int32_t refine_hold_out;
 } vg_options;
 
 /**
@@ -1064,6 +1081,14 @@ typedef struct vg_report_figures {
      * The same after the surface was raised to meet them.
      */
     double uncovered_after;
+    /**
+     * Steps that the optimisation planned, also for `refine_seconds`; 0 where none was asked for.
+     */
+    uint32_t refine_iterations;
+    /**
+     * Steps that the result has seen; 0 if nothing was better than the beginning.
+     */
+    uint32_t refine_kept;
 } vg_report_figures;
 
 /**
