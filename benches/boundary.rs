@@ -135,6 +135,8 @@ fn render(rounds: usize) -> vg::Result<()> {
         depth_row_stride: 0,
         color_format: vg_format::Rgba8 as i32,
         flags: 0,
+        alpha: null_mut(),
+        alpha_row_stride: 0,
     };
     let from_c = c_camera(&camera);
     let times = in_turns(

@@ -12,8 +12,10 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use common::{Random, compare, scenes};
-use glam::{DMat3, DQuat, DVec3};
+use common::scenes::surfel_car;
+use common::timing::{cpu_time, median, ms};
+use common::{compare, scenes};
+use glam::DVec3;
 use std::time::{Duration, Instant};
 use vg::render::cpu::StageTimes;
 use vg::render::{CpuRenderer, Reference, RenderOptions, Rendered, Renderer};
@@ -118,57 +120,4 @@ fn same_bytes(a: &Rendered, b: &Rendered) -> bool {
         color.chain(&p.alpha).chain(&p.depth).map(|v| v.to_bits()).collect()
     };
     bits(a) == bits(b)
-}
-
-/// A shell of `n` discs, 1 cm by 1 cm by 1 mm, spread evenly over an ellipsoid of 4.5 x 1.8 x 1.5 m; opacity 0.5 to
-/// 0.98; SH degree 3.
-fn surfel_car(n: usize) -> Gaussians {
-    const AXES: DVec3 = DVec3::new(2.25, 0.90, 0.75);
-    let mut r = Random::new(0);
-    let (mut means, mut rotations, mut opacities) = (Vec::new(), Vec::new(), Vec::new());
-    let mut sh = Vec::with_capacity(48 * n);
-    while means.len() < n {
-        let u = DVec3::new(r.normal(), r.normal(), r.normal()).normalize();
-        // The area element over its maximum.
-        if r.uniform(0.0, 1.0) >= (u / AXES).length() * AXES.min_element() {
-            continue;
-        }
-        let p = u * AXES;
-        let normal = (u / AXES).normalize();
-        let tangent = normal.cross(DVec3::new(r.normal(), r.normal(), r.normal())).normalize();
-        let q = DQuat::from_mat3(&DMat3::from_cols(tangent, normal.cross(tangent), normal));
-        means.push(p.to_array().map(|v| v as f32));
-        rotations.push([q.w, q.x, q.y, q.z].map(|v| v as f32));
-        opacities.push(r.uniform(0.5, 0.98) as f32);
-        let wave = |k: usize| (p[k] * [6.0, 9.0, 11.0][k] + k as f64).sin();
-        sh.extend([0, 1, 2].map(|k| (0.35 * wave(k) / f64::from(vg::gaussians::sh::Y0)) as f32));
-        sh.extend((3..48).map(|_| (0.04 * r.normal()) as f32));
-    }
-    let scales = vec![[0.01, 0.01, 0.001]; n];
-    Gaussians::from_arrays(3, means, rotations, scales, opacities, sh).unwrap()
-}
-
-/// Sorts, so that the first is the smallest, and returns the middle one.
-fn median(times: &mut [Duration]) -> Duration {
-    times.sort();
-    times[times.len() / 2]
-}
-
-fn ms(d: Duration) -> f64 {
-    d.as_secs_f64() * 1e3
-}
-
-/// Processor time of all threads of this process.
-#[cfg(unix)]
-#[allow(unsafe_code)] // the standard library has no clock of processor time
-fn cpu_time() -> Duration {
-    let mut t = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: `t` is a valid timespec to write to.
-    unsafe { libc::clock_gettime(libc::CLOCK_PROCESS_CPUTIME_ID, &raw mut t) };
-    Duration::new(t.tv_sec as u64, t.tv_nsec as u32)
-}
-
-#[cfg(not(unix))]
-fn cpu_time() -> Duration {
-    Duration::ZERO
 }

@@ -43,6 +43,9 @@
  *            premultiplied; opaque ones have alpha 1. 8-bit values are rounded and clamped; RGBA32F is not clamped
  *            above 1.
  *
+ * Gradients. Of one scalar, a loss, with respect to the number as the library holds it: float32 for pictures and
+ *            Gaussians, laid out as they are, double for camera and background. vg_render_backward.
+ *
  * Ownership. Whoever receives a handle through an out parameter frees it with the matching _free function, which
  *            accepts NULL. Pointers that a function returns are borrowed: they live as long as the handle they were
  *            asked of. transform, mirror and merge return new handles. No struct owns what it points to.
@@ -62,7 +65,7 @@
  *
  * Errors.    Functions that can fail return a vg_status and, through out_error, an object with a message: which
  *            argument, what was found, what is allowed. On failure, out handles are NULL, and everything the caller
- *            owns is as it was. out_error may be NULL. A bug in the library is a status too; it neither aborts nor
+ *            owns is as it was, but for a picture that a vg_loss_fn was shown. out_error may be NULL. A bug in the library is a status too; it neither aborts nor
  *            throws. Running out of memory aborts, as it does in most programs.
  *
  * Same bytes. The same input and the same options give the same bytes, with any number of threads, on the same
@@ -957,6 +960,20 @@ typedef struct vg_options {
      * The network that makes Gaussians of pixels. Default NULL: none; each pixel becomes a disc on the surface.
      */
     const struct vg_model *head_model;
+    /**
+     * Seconds, about, for optimising the model against the photographs, above 0: a number of steps is found that fits,
+     * and `vg_report_figures.refine_iterations` tells it. In addition to `budget_s`. 0: none. Default 0.
+     */
+    double refine_seconds;
+    /**
+     * The same as a number of steps, at most 1000000, which the same input answers with the same bytes; not with
+     * `refine_seconds`. 0: none. Default 0.
+     */
+    uint32_t refine_iterations;
+    /**
+     * 1: one of three or more views takes no part in the optimisation and tells when to stop; 0: all do. Default 0.
+     */
+    int32_t refine_hold_out;
 } vg_options;
 
 /**
@@ -1064,6 +1081,14 @@ typedef struct vg_report_figures {
      * The same after the surface was raised to meet them.
      */
     double uncovered_after;
+    /**
+     * Steps that the optimisation planned, also for `refine_seconds`; 0 where none was asked for.
+     */
+    uint32_t refine_iterations;
+    /**
+     * Steps that the result has seen; 0 if nothing was better than the beginning.
+     */
+    uint32_t refine_kept;
 } vg_report_figures;
 
 /**
@@ -1172,7 +1197,7 @@ typedef struct vg_render_options {
 } vg_render_options;
 
 /**
- * Where `vg_render` puts the picture: colour, depth, or both.
+ * Where `vg_render` puts the picture: colour, depth, alpha, or several of them.
  */
 typedef struct vg_image_target {
     /**
@@ -1211,7 +1236,143 @@ typedef struct vg_image_target {
      * Reserved: 0.
      */
     uint32_t flags;
+    /**
+     * The first alpha of the top row, float32: how much of the pixel the vehicle covers, 0 to 1, whatever the
+     * background. Any alignment. NULL: no alpha.
+     */
+    void *alpha;
+    /**
+     * Bytes from one row to the next; 0: rows without gaps.
+     */
+    size_t alpha_row_stride;
 } vg_image_target;
+
+/**
+ * Called once on the calling thread when the picture is in `target`; fills the planes that the `vg_image_gradient`
+ * points to. Returns 0 to go on; anything else ends the call with `VG_STATUS_CANCELLED`. May call the library, with
+ * the same context too; may not throw or jump out.
+ */
+typedef int32_t (*vg_loss_fn)(void *user);
+
+/**
+ * Gradient of a loss with respect to a picture, which the library reads during the call and does not keep. Finite
+ * numbers of any sign; a plane that is NULL is one the loss does not look at.
+ */
+typedef struct vg_image_gradient {
+    /**
+     * `sizeof(vg_image_gradient)`.
+     */
+    size_t struct_size;
+    /**
+     * Columns; must equal the camera's.
+     */
+    uint32_t width;
+    /**
+     * Rows; must equal the camera's.
+     */
+    uint32_t height;
+    /**
+     * dL / dcolour, float32 R, G, B: of the numbers an RGBA32F target holds, with a transparent background those of
+     * `VG_ALPHA_PREMULTIPLIED`. The first pixel of the top row. Any alignment. `[height][width][3]`
+     */
+    const void *color;
+    /**
+     * Bytes from one row to the next; 0: rows without gaps.
+     */
+    size_t color_row_stride;
+    /**
+     * dL / dalpha, float32: of `vg_image_target.alpha`, which no background changes. `[height][width]`
+     */
+    const void *alpha;
+    /**
+     * Bytes from one row to the next; 0: rows without gaps.
+     */
+    size_t alpha_row_stride;
+    /**
+     * dL / ddepth, float32, per metre: of `vg_image_target.depth` in the `vg_depth_mode` of the options.
+     * `[height][width]`
+     */
+    const void *depth;
+    /**
+     * Bytes from one row to the next; 0: rows without gaps.
+     */
+    size_t depth_row_stride;
+    /**
+     * Computes the planes out of the picture, between drawing it and going back, so that a step of a training loop
+     * draws once. NULL: the planes are there already. Default NULL.
+     */
+    vg_loss_fn loss;
+    /**
+     * Handed to `loss`.
+     */
+    void *loss_user;
+    /**
+     * Reserved: 0.
+     */
+    uint64_t flags;
+} vg_image_gradient;
+
+/**
+ * Where `vg_render_backward` puts gradients: arrays of the caller's, laid out as those of `vg_gaussian_arrays`, at
+ * any address, NULL where not wanted. They are written whole, not added to. All numbers are finite: what a float32
+ * cannot hold is its largest number of that sign.
+ */
+typedef struct vg_gradients {
+    /**
+     * `sizeof(vg_gradients)`.
+     */
+    size_t struct_size;
+    /**
+     * How many Gaussians the arrays have room for: as many as there are. Not looked at where none of the five is
+     * wanted.
+     */
+    size_t count;
+    /**
+     * Of centres, per metre. `[count][3]`
+     */
+    float *positions;
+    /**
+     * Of standard deviations, per metre. `[count][3]`
+     */
+    float *scales;
+    /**
+     * Of the stored unit quaternions w, x, y, z as four free numbers that are normalised before use, so that it is
+     * perpendicular to the quaternion. Whoever handed in a quaternion of another norm divides by that norm.
+     * `[count][4]`
+     */
+    float *rotations;
+    /**
+     * Of peak opacities. `[count]`
+     */
+    float *opacities;
+    /**
+     * Of coefficients of spherical harmonics; zero in bands above `vg_render_options.sh_degree`.
+     * `[count][(sh_degree + 1)^2][3]`
+     */
+    float *sh;
+    /**
+     * Of the background colour R, G, B; zero for a transparent one. `[3]`
+     */
+    double *background;
+    /**
+     * Of the camera's place: turning it about its axes x, y, z, per radian, then moving it along them, per metre;
+     * vehicle_from_camera becomes vehicle_from_camera times the small motion. `[6]`
+     */
+    double *pose;
+    /**
+     * Of the entries of camera_from_vehicle, the inverse of the camera's pose as a 4x4 matrix, row-major, all entries
+     * free; colour is seen from the centre -R^T t. The last row is zero. `[16]`
+     */
+    double *view_matrix;
+    /**
+     * Degree of the spherical harmonics `sh` has room for: the Gaussians'. Not looked at where `sh` is NULL.
+     */
+    int32_t sh_degree;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t flags;
+} vg_gradients;
 
 /**
  * Settings of `vg_segment`.
@@ -1765,6 +1926,49 @@ vg_status vg_render(const struct vg_gaussians *gaussians,
                     const struct vg_render_options *options,
                     const struct vg_image_target *target,
                     struct vg_error **out_error);
+
+/**
+ * Sets `*gradient` to one without planes. `size`: `sizeof *gradient`.
+ */
+VG_API
+vg_status vg_image_gradient_init(struct vg_image_gradient *gradient,
+                                 size_t size);
+
+/**
+ * Sets `*gradients` to one without arrays. `size`: `sizeof *gradients`.
+ */
+VG_API
+vg_status vg_gradients_init(struct vg_gradients *gradients,
+                            size_t size);
+
+/**
+ * Goes back from the gradient of a loss with respect to a picture to its gradients with respect to what `vg_render`
+ * draws that picture of. The picture is drawn again on the way: nothing of an earlier call is needed.
+ *
+ * Constants are: the order of depth, which pixels a Gaussian reaches, what is too faint or too far behind to be
+ * drawn, and the near and far planes. Where a value is clamped its gradient is zero: alpha at `max_alpha`, colour at
+ * 0, the compensation of `antialiased` at its floor.
+ *
+ * - gaussians: not NULL. Any number of threads may use them at a time.
+ * - camera: not NULL.
+ * - options: those of the picture; NULL for the default values. With a transparent background and a gradient of
+ *   colour, `alpha` must be `VG_ALPHA_PREMULTIPLIED`.
+ * - target: NULL, or receives the picture; `gradient->loss` needs one. The memory it points to is written on success,
+ *   and before `loss` is called.
+ * - gradient: not NULL; at least one plane.
+ * - out: not NULL; at least one array. The memory it points to is written on success only.
+ * - out_error: NULL, or receives the error, which names plane, row and column of a number that is not finite.
+ *
+ * The same arguments give the same bytes with any number of threads.
+ */
+VG_API
+vg_status vg_render_backward(const struct vg_gaussians *gaussians,
+                             const struct vg_camera *camera,
+                             const struct vg_render_options *options,
+                             const struct vg_image_target *target,
+                             const struct vg_image_gradient *gradient,
+                             const struct vg_gradients *out,
+                             struct vg_error **out_error);
 
 /**
  * Sets `*options` to the default values. `size`: `sizeof *options`.

@@ -25,8 +25,8 @@
  *            vg_image and a Span own nothing: they point into a Scene, a cv::Mat or Gaussians, which must
  *            outlive them.
  *
- * Options.   Options, ModelOptions, SegmentOptions, RenderOptions, SceneOptions are the structs of vg.h with their default values set.
- *            Their fields are explained there.
+ * Options.   Options, ModelOptions, SegmentOptions, RenderOptions, SceneOptions are the structs of vg.h with
+ *            their default values set. Their fields are explained there.
  *
  * Callbacks. on_progress and on_log take any callable. They come on the calling thread, one at a time. An
  *            exception that leaves one ends the program (std::terminate), because it cannot pass through the
@@ -825,6 +825,98 @@ inline Result<Picture> render(const Gaussians &gaussians, const vg_camera &camer
         return drawn.error();
     }
     return picture;
+}
+
+// ---- Gradients
+
+/// Gradient of a loss with respect to a picture: planes of the caller's memory.
+struct ImageGradient : vg_image_gradient {
+    ImageGradient() noexcept : vg_image_gradient{} {
+        vg_image_gradient_init(this, sizeof(vg_image_gradient));
+    }
+};
+
+/// Gradients of a loss with respect to what a picture is made of, laid out as the arrays of `Gaussians`.
+struct Gradients {
+    /// Of centres, per metre. `[size][3]`
+    std::vector<float> positions;
+    /// Of standard deviations, per metre. `[size][3]`
+    std::vector<float> scales;
+    /// Of unit quaternions w, x, y, z, perpendicular to them. `[size][4]`
+    std::vector<float> rotations;
+    /// Of peak opacities. `[size]`
+    std::vector<float> opacities;
+    /// Of coefficients of spherical harmonics. `[size][(sh_degree + 1)^2][3]`
+    std::vector<float> sh;
+    /// Of the background colour; zero for a transparent one.
+    std::array<double, 3> background{};
+    /// Of turning the camera about its axes, per radian, then of moving it along them, per metre.
+    std::array<double, 6> pose{};
+    /// Of the entries of camera_from_vehicle, row-major.
+    std::array<double, 16> view_matrix{};
+};
+
+/// Whether a loss wants the call to go on. Called on the calling thread; must not throw.
+using LossCallback = std::function<Flow()>;
+
+namespace detail {
+
+inline std::int32_t loss(void *user) noexcept {
+    return (*static_cast<const LossCallback *>(user))() == Flow::Continue ? 0 : 1;
+}
+
+inline Result<void> render_backward_into(Gradients &out, const Gaussians &gaussians, const vg_camera &camera,
+                                         const vg_image_gradient &gradient, const vg_image_target *target,
+                                         const RenderOptions &options) {
+    const std::size_t size = gaussians.size();
+    out.positions.resize(gaussians.positions().size());
+    out.scales.resize(gaussians.scales().size());
+    out.rotations.resize(gaussians.rotations().size());
+    out.opacities.resize(size);
+    out.sh.resize(gaussians.sh().size());
+    vg_gradients arrays{};
+    vg_gradients_init(&arrays, sizeof arrays);
+    arrays.count = size;
+    arrays.sh_degree = gaussians.sh_degree();
+    arrays.positions = out.positions.data();
+    arrays.scales = out.scales.data();
+    arrays.rotations = out.rotations.data();
+    arrays.opacities = out.opacities.data();
+    arrays.sh = out.sh.data();
+    arrays.background = out.background.data();
+    arrays.pose = out.pose.data();
+    arrays.view_matrix = out.view_matrix.data();
+    return done([&](vg_error **error) {
+        return vg_render_backward(gaussians.get(), &camera, &options, target, &gradient, &arrays, error);
+    });
+}
+
+} // namespace detail
+
+/// Goes back from the gradient of a loss with respect to a picture to those of the Gaussians, the background and the
+/// camera. The picture is drawn again on the way.
+inline Result<Gradients> render_backward(const Gaussians &gaussians, const vg_camera &camera,
+                                         const vg_image_gradient &gradient, const RenderOptions &options = {}) {
+    Gradients out;
+    const Result<void> gone = detail::render_backward_into(out, gaussians, camera, gradient, nullptr, options);
+    if (!gone) {
+        return gone.error();
+    }
+    return out;
+}
+
+/// Draws a picture into memory of the caller's, has `loss` look at it there and fill the planes of `gradient`, and
+/// goes back: a step of a training loop that draws once. An empty `loss`: the planes are there already. `out` keeps
+/// its memory; after an error it holds nothing in particular.
+inline Result<void> render_with_gradients(Gradients &out, const vg_image_target &target, const Gaussians &gaussians,
+                                          const vg_camera &camera, const vg_image_gradient &gradient,
+                                          const LossCallback &loss, const RenderOptions &options = {}) {
+    vg_image_gradient planes = gradient;
+    if (loss) {
+        planes.loss = detail::loss;
+        planes.loss_user = detail::user_pointer(loss);
+    }
+    return detail::render_backward_into(out, gaussians, camera, planes, &target, options);
 }
 
 // ---- OpenCV

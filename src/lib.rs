@@ -25,6 +25,7 @@ pub mod onnx;
 pub mod pipeline;
 pub mod prior;
 pub mod progress;
+pub mod refine;
 pub mod relight;
 pub mod render;
 pub mod scene;

@@ -3,7 +3,9 @@
 use crate::error::{Error, Result};
 use std::cell::RefCell;
 use std::ops::ControlFlow;
+use std::sync::mpsc::{self, TryRecvError};
 use std::thread::{self, JoinHandle};
+use std::time::Duration;
 
 /// Where a run stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +27,9 @@ pub struct Threads {
     pool: Option<rayon::ThreadPool>,
     workers: Vec<JoinHandle<()>>,
 }
+
+/// How often a worker looks whether it was answered: much less than an answer takes that is worth asking for.
+const ANSWER_POLL: Duration = Duration::from_micros(20);
 
 /// What the names of worker threads begin with.
 pub const THREAD_NAME: &str = "vg-";
@@ -64,6 +69,43 @@ impl Threads {
     /// Runs `work` on these threads: rayon inside it uses them and no others.
     pub fn run<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         self.pool().install(work)
+    }
+
+    /// Runs `work` on these threads with a function to ask the calling thread, where `answer` runs: for callbacks,
+    /// which belong to the caller's own thread, out of the middle of work. `answer` may use these threads.
+    pub fn run_asking<T: Send, Q: Send, A: Send>(
+        &self,
+        work: impl FnOnce(&dyn Fn(Q) -> A) -> T + Send,
+        mut answer: impl FnMut(Q) -> A,
+    ) -> T {
+        let (ask, asked) = mpsc::channel();
+        let (tell, told) = mpsc::channel();
+        let mut done = None;
+        let slot = &mut done;
+        self.pool().in_place_scope(move |scope| {
+            scope.spawn(move |_| {
+                let ask_caller = |question| {
+                    ask.send(question).expect("the caller listens until the work is done");
+                    loop {
+                        match told.try_recv() {
+                            Ok(answer) => return answer,
+                            Err(TryRecvError::Disconnected) => panic!("no answer: the caller panicked"),
+                            Err(TryRecvError::Empty) => {}
+                        }
+                        // This may be the only worker, and the caller may need one for the answer.
+                        if rayon::yield_now() != Some(rayon::Yield::Executed) {
+                            thread::sleep(ANSWER_POLL);
+                        }
+                    }
+                };
+                *slot = Some(work(&ask_caller));
+            });
+            for question in asked {
+                // Where it cannot be told, the worker panicked and the scope will say so.
+                let _ = tell.send(answer(question));
+            }
+        });
+        done.expect("the scope ends after the work")
     }
 
     fn pool(&self) -> &rayon::ThreadPool {
@@ -116,6 +158,38 @@ impl<'a> Context<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_worker_asks_the_callers_thread_which_may_use_the_worker_meanwhile() {
+        for count in [1, 3] {
+            let threads = Threads::new(count).unwrap();
+            let caller = thread::current().id();
+            let work = |ask: &dyn Fn(u32) -> u32| {
+                assert_ne!(thread::current().id(), caller);
+                (0..4).map(ask).sum::<u32>()
+            };
+            let sum = threads.run_asking(work, |n| {
+                assert_eq!(thread::current().id(), caller);
+                threads.run(|| rayon::join(|| n, || 10 * n)).1
+            });
+            assert_eq!(sum, 60);
+        }
+    }
+
+    #[test]
+    fn a_panic_on_either_side_of_a_question_reaches_the_caller() {
+        use std::panic::{AssertUnwindSafe, catch_unwind};
+        let threads = Threads::new(1).unwrap();
+        let message = |work: &mut dyn FnMut()| {
+            let payload = catch_unwind(AssertUnwindSafe(work)).unwrap_err();
+            *payload.downcast::<&str>().unwrap()
+        };
+        let asking = message(&mut || threads.run_asking(|_: &dyn Fn(())| panic!("asking"), |()| ()));
+        assert_eq!(asking, "asking");
+        let answering = message(&mut || threads.run_asking(|ask| ask(()), |()| panic!("answering")));
+        assert!(["answering", "no answer: the caller panicked"].contains(&answering), "{answering}");
+        assert_eq!(threads.run(|| 7), 7);
+    }
 
     #[test]
     #[cfg(target_os = "linux")]

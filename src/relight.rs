@@ -100,31 +100,37 @@ impl Light {
         upper.lerp(lower, dv)
     }
 
-    /// Shows `clones` in the light of their own side.
-    pub fn apply(&self, gaussians: &mut Gaussians, clones: Range<usize>) -> Relighting {
+    /// Shows `clones` in the light of their own side; also the factor that each one's colour took.
+    pub fn apply(&self, gaussians: &mut Gaussians, clones: Range<usize>) -> (Relighting, Vec<[f32; 3]>) {
         let stride = gaussians.sh_stride();
         let (rotations, colors) = gaussians.rotations_and_colors_mut();
         let colors = &mut colors[clones.start * stride..clones.end * stride];
-        colors.par_chunks_exact_mut(stride).zip(&rotations[clones.clone()]).for_each(|(sh, rotation)| {
-            scale_color(sh, self.gain(normal(*rotation)).to_array());
-        });
-        Relighting { left_over_right: self.left_over_right, sun: self.sun.to_array(), clones: clones.len() }
+        let relit = colors.par_chunks_exact_mut(stride).zip(&rotations[clones.clone()]);
+        let gains = relit.map(|(sh, rotation)| scale_color(sh, self.gain(normal(*rotation)).to_array()));
+        let gains = gains.collect();
+        let done = Relighting {
+            left_over_right: self.left_over_right,
+            sun: self.sun.to_array(),
+            clones: clones.len(),
+        };
+        (done, gains)
     }
 }
 
-/// Multiplies a colour; its mean over directions does not leave [0, 1] by that.
-fn scale_color(sh: &mut [f32], gain: [f32; 3]) {
+/// Multiplies a colour; its mean over directions does not leave [0, 1] by that. The factor that was taken.
+fn scale_color(sh: &mut [f32], gain: [f32; 3]) -> [f32; 3] {
     let mean = sh::to_rgb([sh[0], sh[1], sh[2]]);
-    for channel in 0..3 {
-        let gain = match mean[channel] {
-            c if c > 0.0 => gain[channel].min((1.0 / c).max(1.0)),
-            _ => 1.0,
-        };
+    let taken = std::array::from_fn(|channel| match mean[channel] {
+        c if c > 0.0 => gain[channel].min((1.0 / c).max(1.0)),
+        _ => 1.0,
+    });
+    for (channel, gain) in taken.into_iter().enumerate() {
         for k in (channel..sh.len()).step_by(3) {
             sh[k] *= gain;
         }
         sh[channel] += (gain - 1.0) * 0.5 / sh::Y0;
     }
+    taken
 }
 
 /// Outward normal of a surfel.
@@ -491,8 +497,8 @@ mod tests {
         all.append_mirrored();
         let mirrored = all.clone();
         let n = seen.len();
-        let done = light.apply(&mut all, n..2 * n);
-        assert_eq!(done.clones, n);
+        let (done, gains) = light.apply(&mut all, n..2 * n);
+        assert_eq!((done.clones, gains.len()), (n, n));
         assert!(done.left_over_right < 0.7 && done.sun[1] < -0.2, "{done:?}");
         assert_eq!((all.means(), all.scales()), (mirrored.means(), mirrored.scales()));
         assert_eq!((all.rotations(), all.opacities()), (mirrored.rotations(), mirrored.opacities()));

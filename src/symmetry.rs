@@ -62,16 +62,18 @@ pub enum MirroredPlace {
     SeenBetter,
 }
 
-/// Completes the vehicle. `mirrored_places` tells one verdict per Gaussian; asked in `Auto` only.
+/// Completes the vehicle: clones come last, and the last list tells of which Gaussian each is the mirror image.
+/// `mirrored_places` tells one verdict per Gaussian; asked in `Auto` only.
 pub fn complete(
     gaussians: Gaussians,
     mode: SymmetryMode,
     cameras: &[Camera],
     mirrored_places: impl FnOnce(&Gaussians) -> Vec<MirroredPlace>,
-) -> (Gaussians, Completion) {
+) -> (Gaussians, Completion, Vec<u32>) {
     let reference_side = reference_side(&gaussians, cameras);
     let n = gaussians.len();
     let mut done = Completion { mode, reference_side, cloned: 0, replaced: 0, not_needed: 0 };
+    let mut originals = Vec::new();
     let complete = match mode {
         SymmetryMode::Never | SymmetryMode::Flip => gaussians,
         SymmetryMode::Always => {
@@ -80,6 +82,7 @@ pub fn complete(
             reference.retain(&keep);
             done.cloned = reference.len();
             done.replaced = n - reference.len();
+            originals.extend(0..reference.len() as u32);
             reference.append_mirrored();
             reference
         }
@@ -92,11 +95,12 @@ pub fn complete(
             done.replaced = n - all.len();
             done.cloned = missing.iter().filter(|m| **m).count();
             done.not_needed = all.len() - done.cloned;
+            originals.extend((0..all.len() as u32).filter(|&i| missing[i as usize]));
             all.append_mirrored_of(&missing);
             all
         }
     };
-    (complete, done)
+    (complete, done, originals)
 }
 
 /// The denser side; equal counts choose the side with more cameras, then the left.
@@ -142,7 +146,7 @@ mod tests {
 
     #[test]
     fn always_keeps_the_denser_side_and_replaces_the_other_by_its_mirror_image() {
-        let (g, done) = complete(at(&[-1.0, -0.5, 0.7, 0.0]), SymmetryMode::Always, &[], |_| vec![]);
+        let (g, done, _) = complete(at(&[-1.0, -0.5, 0.7, 0.0]), SymmetryMode::Always, &[], |_| vec![]);
         assert_eq!(ys(&g), [-1.0, -0.5, 0.0, 1.0, 0.5, -0.0]);
         assert_eq!((done.reference_side, done.cloned, done.replaced), (Side::Right, 3, 1));
     }
@@ -161,7 +165,8 @@ mod tests {
     #[test]
     fn auto_clones_what_was_not_seen_across_and_drops_what_was_seen_better_there() {
         let places = [Unseen, Seen, SeenBetter, Seen];
-        let (g, done) = complete(at(&[-1.0, -0.5, 0.9, 0.5]), SymmetryMode::Auto, &[], |_| places.to_vec());
+        let (g, done, _) =
+            complete(at(&[-1.0, -0.5, 0.9, 0.5]), SymmetryMode::Auto, &[], |_| places.to_vec());
         assert_eq!(ys(&g), [-1.0, -0.5, 0.5, 1.0]);
         assert_eq!((done.cloned, done.replaced, done.not_needed), (1, 1, 2));
     }

@@ -63,8 +63,13 @@ pub fn execute<S: Source>(world: &World, source: &mut S) -> Vec<(&'static str, v
     let mut log = Vec::new();
     for _ in 0..=source.below(3) {
         // Where there is most to go wrong.
-        let large: [fn(&World) -> Call; 3] =
-            [calls::reconstruct, calls::render, calls::render_through_a_lens];
+        let large: [fn(&World) -> Call; 5] = [
+            calls::reconstruct,
+            calls::render,
+            calls::render_through_a_lens,
+            calls::render_backward_with_a_picture,
+            calls::render_backward_through_a_lens,
+        ];
         let make = if source.one_in(3) { source.pick(&large) } else { source.pick(&CALLS) };
         let mut call = make(world);
         for _ in 0..source.below(7) {
@@ -73,6 +78,7 @@ pub fn execute<S: Source>(world: &World, source: &mut S) -> Vec<(&'static str, v
         match call.function {
             "vg_reconstruct" => back_views(&mut call),
             "vg_render" => back_target(&mut call),
+            "vg_render_backward" => back_gradients(&mut call),
             "vg_gaussians_from_arrays" => back_arrays(&mut call),
             _ => {}
         }
@@ -246,7 +252,8 @@ fn field<S: Source>(world: &World, call: &mut Call, i: usize, source: &mut S) {
     let put = |lent: &mut Lent, bits: u64| lent.put_in(element, &field.name, k, bits);
     match field.name.as_str() {
         // Of models there are none, and what a path names must be loadable.
-        "struct_size" | "prior_model" | "head_model" | "runtime" => {}
+        // A loss has nothing to look at.
+        "struct_size" | "prior_model" | "head_model" | "runtime" | "loss" | "loss_user" => {}
         "context" => put(lent, source.pick(&[0, world.context as u64])),
         "progress" => put(lent, source.pick(&[0, on_progress as *const () as u64])),
         "log" => put(lent, source.pick(&[0, on_log as *const () as u64])),
@@ -262,7 +269,8 @@ fn field<S: Source>(world: &World, call: &mut Call, i: usize, source: &mut S) {
         }
         // Pictures get their memory once all is decided; arrays and names may go.
         "image.data" | "mask.data" | "depth.data" | "color" | "depth" | "positions" | "scales"
-        | "rotations" | "opacities" | "sh" | "names" | "vehicle_from_world" => {
+        | "rotations" | "opacities" | "sh" | "names" | "vehicle_from_world" | "alpha" | "background" | "pose"
+        | "view_matrix" if field.size == 8 => {
             if source.one_in(3) {
                 put(lent, 0);
             }
@@ -282,7 +290,7 @@ fn field<S: Source>(world: &World, call: &mut Call, i: usize, source: &mut S) {
             put(lent, source.pick(&[0, 1, 2, 3, 1 << 31, u64::MAX]))
         }
         "image.row_stride" | "mask.row_stride" | "depth.row_stride" | "color_row_stride"
-        | "depth_row_stride" => {
+        | "depth_row_stride" | "alpha_row_stride" => {
             let row = source.pick(&[
                 0,
                 1,
@@ -318,7 +326,7 @@ fn field<S: Source>(world: &World, call: &mut Call, i: usize, source: &mut S) {
 fn whole<S: Source>(call: &mut Call, world: &World, source: &mut S) -> bool {
     let (lent, camera) = match call.function {
         "vg_reconstruct" => ("views", "camera."),
-        "vg_render" | "vg_camera_project" | "vg_camera_scale" | "vg_camera_crop" => ("camera", ""),
+        "vg_render" | "vg_render_backward" | "vg_camera_project" | "vg_camera_scale" | "vg_camera_crop" => ("camera", ""),
         "vg_gaussians_from_arrays" => return spoil(call, source),
         _ => return false,
     };
@@ -335,10 +343,14 @@ fn whole<S: Source>(call: &mut Call, world: &World, source: &mut S) -> bool {
             let (width, height) = (source.pick(&sides), source.pick(&sides));
             argument.put_in(element, &name("width"), 0, width);
             argument.put_in(element, &name("height"), 0, height);
-            let other = if call.function == "vg_render" { "target" } else { lent };
+            let other = match call.function {
+                "vg_render" => "target",
+                "vg_render_backward" => "gradient",
+                _ => lent,
+            };
             let parts: &[&str] = match call.function {
                 "vg_reconstruct" => &["image.", "mask.", "depth."],
-                "vg_render" => &[""],
+                "vg_render" | "vg_render_backward" => &[""],
                 _ => &[],
             };
             let at = call.position(other).min(call.arguments.len());
@@ -417,6 +429,11 @@ fn extent(width: u64, height: u64, stride: u64, format: u64) -> Option<(usize, u
         6 => 16,
         _ => return None,
     };
+    extent_of(width, height, stride, pixel)
+}
+
+/// The same of pixels of so many bytes.
+fn extent_of(width: u64, height: u64, stride: u64, pixel: u64) -> Option<(usize, usize, usize)> {
     let side = 1..=8192;
     if !side.contains(&width) || !side.contains(&height) {
         return None;
@@ -465,15 +482,16 @@ fn back_views(call: &mut Call) {
 fn back_target(call: &mut Call) {
     let at = call.position("target");
     let Value::Struct(lent) = &mut call.arguments[at].value else { return };
-    if lent.stride < 56 {
+    if lent.stride < 72 {
         return;
     }
-    call.targets.clear();
-    for (part, shift) in [("color", 1), ("depth", 2)] {
+    // What goes back has eight arrays first.
+    call.targets.truncate(if call.function == "vg_render" { 0 } else { 8 });
+    for (part, shift) in [("color", 1), ("depth", 2), ("alpha", 3)] {
         if lent.get(0, part, 0) == 0 {
             continue;
         }
-        let format = if part == "depth" { 7 } else { lent.get(0, "color_format", 0) };
+        let format = if part == "color" { lent.get(0, "color_format", 0) } else { 7 };
         let [width, height, stride] =
             ["width", "height", &format!("{part}_row_stride")].map(|name| lent.get(0, name, 0));
         let Some((len, row, stride)) = extent(width, height, stride, format) else { continue };
@@ -485,6 +503,31 @@ fn back_target(call: &mut Call) {
         let mut target = Target { memory, row, stride, is_float: matches!(format, 6 | 7) };
         lent.put(part, 0, target.memory.pointer() as u64);
         call.targets.push(target);
+    }
+}
+
+/// Gives a gradient's planes, and the picture, the memory that they claim.
+fn back_gradients(call: &mut Call) {
+    back_target(call);
+    let at = call.position("gradient");
+    let Value::Struct(lent) = &mut call.arguments[at].value else { return };
+    if lent.stride < 88 {
+        return;
+    }
+    for (part, pixel) in [("color", 12), ("alpha", 4), ("depth", 4)] {
+        if lent.get(0, part, 0) == 0 {
+            continue;
+        }
+        let [width, height, stride] =
+            ["width", "height", &format!("{part}_row_stride")].map(|name| lent.get(0, name, 0));
+        let Some((len, ..)) = extent_of(width, height, stride, pixel) else { continue };
+        if len > MAX_BYTES {
+            lent.put("height", 0, 0);
+            continue;
+        }
+        let mut memory = Memory::of(&calls::noise(len.div_ceil(4)), 1);
+        lent.put(part, 0, memory.pointer() as u64);
+        call.inputs.push(memory);
     }
 }
 

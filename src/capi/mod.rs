@@ -41,6 +41,8 @@ mod reconstruct;
 
 mod render;
 
+mod gradient;
+
 mod segment;
 
 mod scene;
@@ -51,6 +53,7 @@ mod tests;
 pub use camera::*;
 pub use context::*;
 pub use gaussians::*;
+pub use gradient::*;
 pub use image::*;
 pub use model::*;
 pub use options::*;

@@ -7,6 +7,7 @@ use super::read::{self, Versioned};
 use super::status::{c_string, one_line, vg_status};
 use crate::error::{Error, Result};
 use crate::pipeline::{Calibrate, Keep, Options, PriorChoice};
+use crate::refine::{Amount, RefineOptions};
 use crate::relight::Relight;
 use crate::scene::Cloud;
 use crate::scene::cloud::MAX_CLOUD_POINTS;
@@ -160,6 +161,14 @@ pub struct vg_options {
     pub prior_model: *const vg_model,
     /// The network that makes Gaussians of pixels. Default NULL: none; each pixel becomes a disc on the surface.
     pub head_model: *const vg_model,
+    /// Seconds, about, for optimising the model against the photographs, above 0: a number of steps is found that fits,
+    /// and `vg_report_figures.refine_iterations` tells it. In addition to `budget_s`. 0: none. Default 0.
+    pub refine_seconds: f64,
+    /// The same as a number of steps, at most 1000000, which the same input answers with the same bytes; not with
+    /// `refine_seconds`. 0: none. Default 0.
+    pub refine_iterations: u32,
+    /// 1: one of three or more views takes no part in the optimisation and tells when to stop; 0: all do. Default 0.
+    pub refine_hold_out: i32,
 }
 
 unsafe impl Versioned for vg_options {
@@ -192,6 +201,9 @@ unsafe impl Versioned for vg_options {
             max_views: 0,
             prior_model: std::ptr::null(),
             head_model: std::ptr::null(),
+            refine_seconds: 0.0,
+            refine_iterations: 0,
+            refine_hold_out: 0,
         }
     }
 }
@@ -232,6 +244,7 @@ impl vg_options {
             calibrate: read::choice("options.calibrate", self.calibrate, &calibrations)?,
             relight: read::choice("options.relight", self.relight, &relightings)?,
             check: read::flag("options.check", self.check)?,
+            refine: self.refinement()?,
             photo: read::flag("options.photo", self.photo)?,
             budget_s: (self.budget_s != 0.0).then_some(self.budget_s),
             resolution: self.resolution,
@@ -239,6 +252,26 @@ impl vg_options {
             points: read::flag("options.points", self.points)?,
             threads: 0,
         })
+    }
+
+    fn refinement(&self) -> Result<Option<RefineOptions>> {
+        let hold_out = read::flag("options.refine_hold_out", self.refine_hold_out)?;
+        let amount = match (self.refine_iterations, self.refine_seconds) {
+            (0, 0.0) => return Ok(None),
+            (steps, 0.0) => Amount::Iterations(steps),
+            (0, seconds) => Amount::Seconds(seconds),
+            (steps, seconds) => {
+                let found = format!("{seconds}, with refine_iterations {steps}");
+                return Err(Error::argument("options.refine_seconds", found, "one of both"));
+            }
+        };
+        let options = RefineOptions { amount, hold_out, ..RefineOptions::default() };
+        let names = [
+            ("options.refine.iterations", "options.refine_iterations"),
+            ("options.refine.seconds", "options.refine_seconds"),
+        ];
+        options.validate().map_err(|e| read::renamed(e, &names))?;
+        Ok(Some(options))
     }
 
     /// A copy of the measured points.

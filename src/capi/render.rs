@@ -115,7 +115,7 @@ unsafe impl Versioned for vg_render_options {
     }
 }
 
-/// Where `vg_render` puts the picture: colour, depth, or both.
+/// Where `vg_render` puts the picture: colour, depth, alpha, or several of them.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(test, safer_ffi::derive_ReprC)]
@@ -138,6 +138,11 @@ pub struct vg_image_target {
     pub color_format: i32,
     /// Reserved: 0.
     pub flags: u32,
+    /// The first alpha of the top row, float32: how much of the pixel the vehicle covers, 0 to 1, whatever the
+    /// background. Any alignment. NULL: no alpha.
+    pub alpha: *mut c_void,
+    /// Bytes from one row to the next; 0: rows without gaps.
+    pub alpha_row_stride: usize,
 }
 
 unsafe impl Versioned for vg_image_target {
@@ -155,6 +160,8 @@ unsafe impl Versioned for vg_image_target {
             depth_row_stride: 0,
             color_format: vg_format::Rgba8 as i32,
             flags: 0,
+            alpha: std::ptr::null_mut(),
+            alpha_row_stride: 0,
         }
     }
 }
@@ -207,7 +214,7 @@ pub unsafe extern "C" fn vg_render(
 }
 
 impl vg_render_options {
-    fn read(&self) -> Result<(RenderOptions, vg_alpha)> {
+    pub(super) fn read(&self) -> Result<(RenderOptions, vg_alpha)> {
         let backends = [
             (vg_backend::Auto as i32, "auto", true),
             (vg_backend::Cpu as i32, "cpu", true),
@@ -254,9 +261,10 @@ impl vg_render_options {
 }
 
 /// The caller's memory, checked.
-struct Target {
+pub(super) struct Target {
     color: Option<(*mut u8, usize, Pixel)>,
     depth: Option<(*mut u8, usize)>,
+    alpha: Option<(*mut u8, usize)>,
 }
 
 /// How a pixel is written.
@@ -288,7 +296,7 @@ impl Layout {
 }
 
 impl Target {
-    unsafe fn read(
+    pub(super) unsafe fn read(
         target: *const vg_image_target,
         settings: &RenderOptions,
         alpha: vg_alpha,
@@ -302,8 +310,9 @@ impl Target {
             let allowed = format!("the camera's size, {width}x{height}");
             return Err(Error::argument("target.size", found, allowed));
         }
-        if target.color.is_null() && target.depth.is_null() {
-            return Err(Error::argument("target", "neither color nor depth", "at least one of them"));
+        if target.color.is_null() && target.depth.is_null() && target.alpha.is_null() {
+            let found = "neither color nor depth nor alpha";
+            return Err(Error::argument("target", found, "at least one of them"));
         }
         let opaque = settings.background != Background::Transparent;
         let color = match target.color.is_null() {
@@ -321,20 +330,21 @@ impl Target {
                 Some((target.color.cast(), stride, Pixel { layout, opaque, alpha }))
             }
         };
-        let depth = match target.depth.is_null() {
-            true => None,
+        let plane = |argument: &str, first: *mut c_void, row_stride: usize| match first.is_null() {
+            true => Ok(None),
             false => {
                 let bytes = size_of::<f32>();
-                let (_, stride) =
-                    extent("target.depth", "_row_stride", width, height, target.depth_row_stride, bytes)?;
-                Some((target.depth.cast(), stride))
+                let (_, stride) = extent(argument, "_row_stride", width, height, row_stride, bytes)?;
+                Ok(Some((first.cast(), stride)))
             }
         };
-        Ok(Self { color, depth })
+        let depth = plane("target.depth", target.depth, target.depth_row_stride)?;
+        let alpha = plane("target.alpha", target.alpha, target.alpha_row_stride)?;
+        Ok(Self { color, depth, alpha })
     }
 
     /// Copies the picture row by row, through slices of one row each: the gaps are not ours.
-    unsafe fn write(&self, picture: &Rendered) {
+    pub(super) unsafe fn write(&self, picture: &Rendered) {
         let width = picture.width as usize;
         for v in 0..picture.height as usize {
             let row = v * width..(v + 1) * width;
@@ -346,11 +356,11 @@ impl Target {
                     pixel.write(bytes, *color, *alpha);
                 }
             }
-            if let Some((first, stride)) = self.depth {
+            for (plane, values) in [(self.depth, &picture.depth), (self.alpha, &picture.alpha)] {
+                let Some((first, stride)) = plane else { continue };
                 let len = width * size_of::<f32>();
-                let source = bytemuck::cast_slice(&picture.depth[row]);
                 let target = unsafe { std::slice::from_raw_parts_mut(first.add(v * stride), len) };
-                target.copy_from_slice(source);
+                target.copy_from_slice(bytemuck::cast_slice(&values[row.clone()]));
             }
         }
     }

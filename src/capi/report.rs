@@ -109,6 +109,10 @@ pub struct vg_report_figures {
     pub uncovered_before: f64,
     /// The same after the surface was raised to meet them.
     pub uncovered_after: f64,
+    /// Steps that the optimisation planned, also for `refine_seconds`; 0 where none was asked for.
+    pub refine_iterations: u32,
+    /// Steps that the result has seen; 0 if nothing was better than the beginning.
+    pub refine_kept: u32,
 }
 
 unsafe impl Versioned for vg_report_figures {
@@ -142,6 +146,8 @@ unsafe impl Versioned for vg_report_figures {
             calibration_lateral_m: 0.0,
             uncovered_before: 0.0,
             uncovered_after: 0.0,
+            refine_iterations: 0,
+            refine_kept: 0,
         }
     }
 }
@@ -187,6 +193,8 @@ impl vg_report_figures {
             calibration_lateral_m: report.calibration.as_ref().map_or(0.0, |c| c.lateral_m),
             uncovered_before: report.masks.map_or(0.0, |m| m.uncovered_before),
             uncovered_after: report.masks.map_or(0.0, |m| m.uncovered_after),
+            refine_iterations: report.refinement.as_ref().map_or(0, |r| r.iterations),
+            refine_kept: report.refinement.as_ref().map_or(0, |r| r.kept),
             ..Self::initial()
         }
     }

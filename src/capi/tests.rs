@@ -41,15 +41,23 @@ fn layout_of_rust() -> String {
         vg_camera { struct_size width height model flags params vehicle_from_camera reserved }
         vg_context_options { struct_size threads flags }
         vg_gaussian_arrays { struct_size count positions scales rotations opacities sh sh_degree flags }
+        vg_gradients {
+            struct_size count positions scales rotations opacities sh background pose view_matrix sh_degree flags
+        }
         vg_image { data row_stride width height format flags }
+        vg_image_gradient {
+            struct_size width height color color_row_stride alpha alpha_row_stride depth depth_row_stride loss
+            loss_user flags
+        }
         vg_image_target {
-            struct_size width height color color_row_stride depth depth_row_stride color_format flags
+            struct_size width height color color_row_stride depth depth_row_stride color_format flags alpha
+            alpha_row_stride
         }
         vg_model_options { struct_size runtime provider fall_back threads prepack arena flags }
         vg_options {
             struct_size context prior symmetry sh_degree keep check points vehicle_size progress progress_user log
             log_user calibrate relight photo flags budget_s cloud cloud_count resolution
-            max_views prior_model head_model
+            max_views prior_model head_model refine_seconds refine_iterations refine_hold_out
         }
         vg_render_options {
             struct_size context backend background background_color alpha depth_mode sh_degree antialiased blur
@@ -59,7 +67,7 @@ fn layout_of_rust() -> String {
             struct_size gaussian_count mirrored_count views_used threads prior sh_degree total_ms peak_rss_bytes
             has_input_error has_box input_psnr_db input_silhouette_iou box_size extent_low extent_high relit_count
             cloud_used photo_found calibration has_uncovered calibration_yaw_degrees calibration_lateral_m
-            uncovered_before uncovered_after
+            uncovered_before uncovered_after refine_iterations refine_kept
         }
         vg_scene_options {
             struct_size context vehicle_from_world names name_count depth_scale load_depth flags log log_user
@@ -127,6 +135,7 @@ fn vg_abi_witness(
     _: &vg_camera,
     _: &vg_context_options,
     _: &vg_gaussian_arrays,
+    _: &vg_gradients,
     _: &vg_image_target,
     _: &vg_model_options,
     _: &vg_options,
@@ -136,6 +145,7 @@ fn vg_abi_witness(
 /// The rest: a function of the witness takes few arguments.
 #[safer_ffi::ffi_export]
 fn vg_abi_witness_more(
+    _: &vg_image_gradient,
     _: &vg_render_options,
     _: &vg_report_figures,
     _: &vg_scene_options,
@@ -235,6 +245,9 @@ fn every_function() -> Vec<(&'static str, Call)> {
         vg_render_options_init(null_mut(), 0) status;
         vg_image_target_init(null_mut(), 0) status;
         vg_render(null(), null(), null(), null()) reports;
+        vg_image_gradient_init(null_mut(), 0) status;
+        vg_gradients_init(null_mut(), 0) status;
+        vg_render_backward(null(), null(), null(), null(), null(), null()) reports;
         vg_segment_options_init(null_mut(), 0) status;
         vg_segment(null(), null(), null(), null(), null_mut(), 0) reports;
         vg_scene_options_init(null_mut(), 0) status;

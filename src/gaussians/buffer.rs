@@ -52,7 +52,33 @@ pub(super) struct MovedArrays<'a> {
     pub(super) sh: &'a mut [f32],
 }
 
+/// All arrays, to be filled by one who keeps the invariants.
+pub(crate) struct ArraysMut<'a> {
+    pub(crate) means: &'a mut [[f32; 3]],
+    pub(crate) rotations: &'a mut [[f32; 4]],
+    pub(crate) scales: &'a mut [[f32; 3]],
+    pub(crate) opacities: &'a mut [f32],
+    pub(crate) sh: &'a mut [f32],
+}
+
 impl Gaussians {
+    /// Arrays of `len` Gaussians of this degree, reusing memory; what they hold is to be written over.
+    pub(crate) fn arrays_of(&mut self, sh_degree: u8, len: usize) -> ArraysMut<'_> {
+        self.sh_degree = sh_degree;
+        self.means.resize(len, [0.0; 3]);
+        self.rotations.resize(len, [1.0, 0.0, 0.0, 0.0]);
+        self.scales.resize(len, [1.0; 3]);
+        self.opacities.resize(len, 0.0);
+        self.sh.resize(len * 3 * sh::coefficients(sh_degree), 0.0);
+        ArraysMut {
+            means: &mut self.means,
+            rotations: &mut self.rotations,
+            scales: &mut self.scales,
+            opacities: &mut self.opacities,
+            sh: &mut self.sh,
+        }
+    }
+
     /// Rotations, and the coefficients of all colours, which must stay finite.
     pub(crate) fn rotations_and_colors_mut(&mut self) -> (&[[f32; 4]], &mut [f32]) {
         (&self.rotations, &mut self.sh)
@@ -200,6 +226,16 @@ impl Gaussians {
                 compact(&mut self.opacities, &runs, 1);
             },
         );
+    }
+
+    /// The first `len`.
+    pub(crate) fn truncate(&mut self, len: usize) {
+        let stride = self.sh_stride();
+        self.means.truncate(len);
+        self.rotations.truncate(len);
+        self.scales.truncate(len);
+        self.opacities.truncate(len);
+        self.sh.truncate(len * stride);
     }
 
     /// Those with `keep[index]`, in order.

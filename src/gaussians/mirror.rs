@@ -47,7 +47,7 @@ impl Gaussians {
 }
 
 /// Sign of each of the `[16][3]` coefficients under y -> -y.
-fn sh_signs(degree: u8) -> [f32; 48] {
+pub(crate) fn sh_signs(degree: u8) -> [f32; 48] {
     let mut signs = [1.0; 48];
     for k in 0..sh::coefficients(degree) {
         if sh::ODD_IN_Y[k] {

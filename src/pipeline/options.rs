@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::onnx::{self, Model};
+use crate::refine::RefineOptions;
 use crate::relight::Relight;
 use crate::symmetry::SymmetryMode;
 use serde::{Deserialize, Serialize};
@@ -97,6 +98,8 @@ pub struct Options {
     pub threads: usize,
     /// Whether to return the metric coloured point cloud as well.
     pub points: bool,
+    /// How the result is optimised against the photographs; `None`, the default: it is not.
+    pub refine: Option<RefineOptions>,
 }
 
 impl Default for Options {
@@ -118,6 +121,7 @@ impl Default for Options {
             max_views: None,
             threads: 0,
             points: false,
+            refine: None,
         }
     }
 }
@@ -165,6 +169,9 @@ impl Options {
         }
         if self.max_views == Some(0) {
             return Err(Error::argument("options.max_views", "0", "at least 1"));
+        }
+        if let Some(refine) = &self.refine {
+            refine.validate()?;
         }
         if self.sh_degree > crate::gaussians::sh::MAX_DEGREE {
             return Err(Error::argument("options.sh_degree", self.sh_degree.to_string(), "0 to 3"));

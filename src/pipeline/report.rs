@@ -4,6 +4,7 @@ use super::budget::BudgetPlan;
 use super::options::Options;
 use crate::calibrate::Calibration;
 use crate::prior::{BoxSource, Filled, NetworkFit, PhotoFit, PointFit, VehicleBox};
+use crate::refine::Refinement;
 use crate::relight::Relighting;
 use crate::symmetry::Completion;
 use serde::Serialize;
@@ -12,7 +13,7 @@ use std::time::Instant;
 /// One stage of the run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Stage {
-    /// plan, undistort, calibrate, prior, pixels, head, symmetry, check.
+    /// plan, undistort, calibrate, prior, pixels, head, symmetry, refine, check.
     pub name: &'static str,
     /// Wall time, milliseconds.
     pub ms: f64,
@@ -103,6 +104,8 @@ pub struct Report {
     pub symmetry: Completion,
     /// The light of the unseen side, where it was estimated.
     pub relight: Option<Relighting>,
+    /// What the optimisation did, where it was asked for.
+    pub refinement: Option<Refinement>,
     /// Error on the input views, unless the check was switched off.
     pub input_error: Option<InputError>,
     /// The options of the call; where it had a budget, those that were chosen: with them and without a budget another

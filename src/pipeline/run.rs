@@ -14,6 +14,7 @@ use crate::head::{GaussianHead, NetworkHead, SurfelHead};
 use crate::metrics;
 use crate::prior::{DepthPrior, Geometry, GivenDepth, HullPrior, NetworkPrior, ShapePrior};
 use crate::progress::{Context, ProgressCallback, Threads};
+use crate::refine::{self, tie::Clone as Tied};
 use crate::relight::{Light, Relight, Relighting};
 use crate::render::{CpuRenderer, RenderOptions, Renderer};
 use crate::scene::visibility::{Observer, SURFACE_M, Sight};
@@ -134,14 +135,23 @@ pub fn reconstruct_on<'a>(
     clock.lap("head");
 
     context.report("symmetry", 0.0)?;
-    let (gaussians, completion, relight) =
+    let Completed { gaussians, completion, clones, relight } =
         context.parallel(|| complete(gaussians, options, &views, &geometry));
     plan::note(&mut left_out, "clones", "the mirrored place was observed by a view", completion.not_needed);
+    clock.lap("symmetry");
+
+    let (gaussians, refinement) = match &options.refine {
+        Some(how) => {
+            let (refined, done) = refine::refine(gaussians, &clones, &seen, how, &context)?;
+            (refined, Some(done))
+        }
+        None => (gaussians, None),
+    };
+    clock.lap("refine");
     let (gaussians, points, views) = match &moved {
         Some(moved) => back_in_vehicle(&gaussians, points, moved, &context)?,
         None => (gaussians, points, seen),
     };
-    clock.lap("symmetry");
 
     let input_error = match options.check {
         true => Some(input_error(&gaussians, &views, &context)?),
@@ -172,6 +182,7 @@ pub fn reconstruct_on<'a>(
         left_out,
         symmetry: completion,
         relight,
+        refinement,
         input_error,
         settings: options.clone(),
     };
@@ -255,12 +266,7 @@ fn point_cloud(views: &[View], geometry: &Geometry) -> PointCloud {
 /// Cloning; in `Auto` the mirrored place counts as seen where a view looked at it and saw a surface, or saw
 /// through it to another one. The background says nothing here: with poses a pixel off, the rim of every mirror
 /// image lies in it. Clones are last; they are shown in the light of their own side.
-fn complete(
-    gaussians: Gaussians,
-    options: &Options,
-    views: &[View],
-    geometry: &Geometry,
-) -> (Gaussians, Completion, Option<Relighting>) {
+fn complete(gaussians: Gaussians, options: &Options, views: &[View], geometry: &Geometry) -> Completed {
     let cameras: Vec<_> = views.iter().map(|v| v.camera).collect();
     let verdict = |observers: &[Observer], gaussians: &Gaussians, i: usize| {
         let (place, normal, own) = mirrored_place(gaussians, i);
@@ -283,13 +289,26 @@ fn complete(
         (Relight::Never, _) | (_, SymmetryMode::Never | SymmetryMode::Flip) => None,
         (Relight::Auto, _) => Light::estimate(&gaussians),
     };
-    let (mut gaussians, done) = symmetry::complete(gaussians, options.symmetry, &cameras, |gaussians| {
-        let observers = geometry.observers(views);
-        (0..gaussians.len()).into_par_iter().map(|i| verdict(&observers, gaussians, i)).collect()
-    });
-    let clones = gaussians.len() - done.cloned..gaussians.len();
-    let relighting = light.map(|light| light.apply(&mut gaussians, clones));
-    (gaussians, done, relighting)
+    let (mut gaussians, completion, originals) =
+        symmetry::complete(gaussians, options.symmetry, &cameras, |gaussians| {
+            let observers = geometry.observers(views);
+            (0..gaussians.len()).into_par_iter().map(|i| verdict(&observers, gaussians, i)).collect()
+        });
+    let range = gaussians.len() - completion.cloned..gaussians.len();
+    let (relight, gains) = light.map(|light| light.apply(&mut gaussians, range)).unzip();
+    let gain = |k: usize| gains.as_ref().map_or([1.0; 3], |gains: &Vec<[f32; 3]>| gains[k]);
+    let clones = originals.into_iter().enumerate().map(|(k, of)| Tied { of, gain: gain(k) }).collect();
+    Completed { gaussians, completion, clones, relight }
+}
+
+/// A vehicle with both sides.
+struct Completed {
+    /// Originals, then clones.
+    gaussians: Gaussians,
+    completion: Completion,
+    /// Of what each clone is the mirror image.
+    clones: Vec<Tied>,
+    relight: Option<Relighting>,
 }
 
 /// Centre and normal of the mirror image of a surfel, and the resolution at which the original was seen.

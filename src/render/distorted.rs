@@ -5,7 +5,9 @@
 //! sum of T alpha z, divided by the resampled alpha in the end: these sums are linear, so an interpolated pixel is
 //! what blending between its neighbours would have drawn, and empty neighbours do not pull its depth towards 0.
 
-use super::{Background, DepthMode, RenderOptions, Rendered, Renderer};
+use super::{
+    Background, DepthMode, Differentiable, Gradients, PictureGradient, RenderOptions, Rendered, Renderer,
+};
 use crate::error::Result;
 use crate::gaussians::Gaussians;
 use crate::geometry::Camera;
@@ -16,6 +18,9 @@ use rayon::prelude::*;
 /// Pinhole pixels per pixel and axis. Interpolating at this spacing keeps the peak of the smallest splat, whose
 /// standard deviation is sqrt(0.3) pixels, to 10 %; its centroid and its sum exactly.
 pub const SUPERSAMPLING: f64 = 2.0;
+
+/// Of a gradient's entries when it is scattered.
+const LARGEST: f32 = 1e34;
 
 /// Largest blur the options accept, pixels^2.
 const MAX_BLUR: f32 = 100.0;
@@ -64,6 +69,14 @@ impl LensMap {
         camera: &Camera,
         options: &RenderOptions,
     ) -> Result<Rendered> {
+        let (pinhole, fine) = self.pinhole(camera, options);
+        let mut out = Rendered::default();
+        self.resample(&renderer.render(gaussians, &pinhole, &fine)?, options, &mut out);
+        Ok(out)
+    }
+
+    /// The camera and options of the pinhole picture that is resampled.
+    pub(super) fn pinhole(&self, camera: &Camera, options: &RenderOptions) -> (Camera, RenderOptions) {
         let pinhole = Camera { vehicle_from_camera: camera.vehicle_from_camera, ..self.pinhole };
         // Focal lengths in pixels grew by this; a blur given in pixels^2 grows by its square.
         let scale = pinhole.intrinsics.fx / camera.intrinsics.fx;
@@ -73,18 +86,19 @@ impl LensMap {
             blur: ((f64::from(options.blur) * scale * scale) as f32).min(MAX_BLUR),
             ..*options
         };
-        let picture = renderer.render(gaussians, &pinhole, &fine)?;
-        let pixels = camera.width as usize * camera.height as usize;
-        let mut out = Rendered {
-            width: camera.width,
-            height: camera.height,
-            color: vec![[0.0; 3]; pixels],
-            alpha: vec![0.0; pixels],
-            depth: vec![0.0; pixels],
-        };
+        (pinhole, fine)
+    }
+
+    /// The lens's picture of the pinhole picture `fine`.
+    pub(super) fn resample(&self, fine: &Rendered, options: &RenderOptions, out: &mut Rendered) {
+        let pixels = self.positions.len();
+        (out.width, out.height) = (self.source.width, self.source.height);
+        out.color.resize(pixels, [0.0; 3]);
+        out.alpha.resize(pixels, 0.0);
+        out.depth.resize(pixels, 0.0);
         let planes = out.color.par_iter_mut().zip(&mut out.alpha).zip(&mut out.depth);
         planes.zip(&self.positions).with_min_len(1 << 12).for_each(|(((color, alpha), depth), position)| {
-            let ([r, g, b], a, d) = sample(&picture, *position);
+            let ([r, g, b], a, d) = sample(fine, *position);
             let behind = match options.background {
                 Background::Color(rgb) => rgb.map(|v| v * (1.0 - a)),
                 Background::Transparent => [0.0; 3],
@@ -97,7 +111,59 @@ impl LensMap {
                 DepthMode::Accumulated => d,
             };
         });
-        Ok(out)
+    }
+
+    /// The adjoint of [`LensMap::resample`]: the gradient of the lens's picture scattered with the weights it was
+    /// read with. `picture` is the lens's. Returns the gradient of the background.
+    ///
+    /// One thread, in the order of the lens's pixels.
+    pub(super) fn scatter(
+        &self,
+        picture: &Rendered,
+        options: &RenderOptions,
+        gradient: &PictureGradient,
+        fine: &mut PictureGradient,
+    ) -> [f64; 3] {
+        let (width, height) = (fine.width, fine.height);
+        fine.add_planes();
+        let PictureGradient { color: color_plane, alpha: alpha_plane, depth: depth_plane, .. } = fine;
+        let mut background = [0.0; 3];
+        let behind = match options.background {
+            Background::Color(rgb) => Some(rgb),
+            Background::Transparent => None,
+        };
+        for (i, position) in self.positions.iter().enumerate() {
+            let a = picture.alpha[i];
+            let color = gradient.color.get(i).copied().unwrap_or([0.0; 3]);
+            let mut alpha = gradient.alpha.get(i).copied().unwrap_or(0.0);
+            let mut depth = gradient.depth.get(i).copied().unwrap_or(0.0);
+            if let Some(behind) = behind {
+                for c in 0..3 {
+                    alpha -= color[c] * behind[c];
+                    background[c] += f64::from(color[c]) * f64::from(1.0 - a);
+                }
+            }
+            if options.depth_mode == DepthMode::Expected {
+                // d(D/A) = (dD - D/A dA) / A.
+                depth = if a > 0.0 { depth / a } else { 0.0 };
+                alpha -= depth * picture.depth[i];
+            }
+            if position[0].is_nan() {
+                continue;
+            }
+            // A gradient near the end of f32 saturates: the sums of its neighbours stay finite.
+            let (alpha, depth) = (alpha.clamp(-LARGEST, LARGEST), depth.clamp(-LARGEST, LARGEST));
+            let color = color.map(|v| v.clamp(-LARGEST, LARGEST));
+            let taps = Taps::new(*position, width, height);
+            for (at, weight) in taps.index.into_iter().zip(taps.weights()) {
+                for c in 0..3 {
+                    color_plane[at][c] += weight * color[c];
+                }
+                alpha_plane[at] += weight * alpha;
+                depth_plane[at] += weight * depth;
+            }
+        }
+        background
     }
 }
 
@@ -112,6 +178,28 @@ pub fn render(
     camera.validate("camera")?;
     options.validate()?;
     LensMap::new(camera)?.render(renderer, gaussians, camera, options)
+}
+
+/// Gradients through a lens, by a renderer that is differentiated for pinholes.
+pub(super) fn backward(
+    renderer: &impl Differentiable,
+    gaussians: &Gaussians,
+    camera: &Camera,
+    options: &RenderOptions,
+    gradient: &PictureGradient,
+) -> Result<Gradients> {
+    camera.validate("camera")?;
+    options.validate()?;
+    gradient.validate(camera)?;
+    let map = LensMap::new(camera)?;
+    let (pinhole, fine) = map.pinhole(camera, options);
+    let fine_picture = renderer.render(gaussians, &pinhole, &fine)?;
+    let (mut picture, mut of_fine) = (Rendered::default(), PictureGradient::default());
+    map.resample(&fine_picture, options, &mut picture);
+    of_fine.reset(&fine_picture);
+    let background = map.scatter(&picture, options, gradient, &mut of_fine);
+    let gradients = renderer.backward(gaussians, &pinhole, &fine, &of_fine)?;
+    Ok(Gradients { background, ..gradients })
 }
 
 /// Premultiplied colour, alpha and accumulated depth, bilinear; edges repeated; nothing at NaN.

@@ -2,14 +2,17 @@
 
 pub mod cpu;
 pub mod distorted;
+pub mod gradient;
+pub mod loss;
 pub mod options;
 pub mod output;
 pub mod reference;
 
 pub use cpu::CpuRenderer;
+pub use gradient::{Differentiable, Gradients, PictureGradient, PoseGradient};
 pub use options::{Background, DepthMode, RenderOptions};
 pub use output::Rendered;
-pub use reference::Reference;
+pub use reference::{Reference, ReferenceGradients};
 
 use crate::error::Result;
 use crate::gaussians::Gaussians;

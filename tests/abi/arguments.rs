@@ -923,7 +923,12 @@ fn cameras_that_stand_anywhere_make_finite_numbers_or_none() {
             }
             call.run(true);
         }
-        for make in [calls::render as fn(&World) -> Call, calls::render_through_a_lens] {
+        for make in [
+            calls::render as fn(&World) -> Call,
+            calls::render_through_a_lens,
+            calls::render_backward,
+            calls::render_backward_through_a_lens,
+        ] {
             let mut call = make(&table.world);
             call.lent("camera").put("vehicle_from_camera", 3, f64::to_bits(far));
             call.run(true);
@@ -983,7 +988,8 @@ fn pictures_are_written_in_every_format_at_any_address_and_only_there() {
     };
     table.row(make, "only depth", without(&["color"]), Fine);
     table.row(make, "only colour", without(&["depth"]), Fine);
-    table.row(make, "neither", without(&["color", "depth"]), refused("target"));
+    table.row(make, "only alpha", without(&["color", "depth"]), Fine);
+    table.row(make, "neither", without(&["color", "depth", "alpha"]), refused("target: neither"));
     table.row(make, "no context", |call| call.lent("options").put("context", 0, 0), Fine);
     table.row(make, "nothing to draw", |call| call.arguments[0].value = Value::Handle(nothing()), Fine);
     let close = |call: &mut Call| {
@@ -991,6 +997,211 @@ fn pictures_are_written_in_every_format_at_any_address_and_only_there() {
         call.lent("options").put("far_plane", 0, u64::from(1.0f32.to_bits()));
     };
     table.row(make, "far before near", close, refused("options.far_plane"));
+}
+
+/// What a call that goes back wrote: arrays first, then pictures.
+fn written(call: &Call) -> Vec<Vec<u8>> {
+    call.targets.iter().map(|target| target.memory.content().to_vec()).collect()
+}
+
+#[test]
+fn gradients_go_where_they_are_wanted_and_nowhere_else() {
+    let mut table = Table::new();
+    let make = calls::render_backward;
+    let mut whole = make(&table.world);
+    assert!(whole.run(true).is_ok());
+    let whole = written(&whole);
+    assert!(whole.iter().all(|array| array.iter().any(|&byte| byte != calls::CANARY && byte != 0)));
+    let arrays = ["positions", "scales", "rotations", "opacities", "sh", "background", "pose", "view_matrix"];
+    for (i, wanted) in arrays.into_iter().enumerate() {
+        let mut call = make(&table.world);
+        for other in arrays.iter().filter(|other| **other != wanted) {
+            call.lent("out").put(other, 0, 0);
+        }
+        // Of the camera and the background alone, the number of Gaussians does not matter.
+        if i >= 5 {
+            call.lent("out").put("count", 0, 0);
+            call.lent("out").put("sh_degree", 0, 77);
+        }
+        assert!(call.run(true).is_ok(), "only {wanted}");
+        for (k, found) in written(&call).into_iter().enumerate() {
+            let expected = if k == i { whole[k].clone() } else { vec![calls::CANARY; found.len()] };
+            assert!(found == expected, "only {wanted}: {}", arrays[k]);
+        }
+    }
+    let none = |call: &mut Call| arrays.iter().for_each(|name| call.lent("out").put(name, 0, 0));
+    table.row(make, "no array", none, refused("out: no array"));
+    let few = |call: &mut Call| call.arguments[0].value = Value::Handle(nothing());
+    table.row(make, "other Gaussians", few, refused("out.count"));
+    let nothing_to_draw = |call: &mut Call| {
+        few(call);
+        call.lent("out").put("count", 0, 0);
+        call.lent("out").put("sh_degree", 0, 0);
+        call.targets.drain(..5);
+    };
+    table.row(make, "nothing to draw", nothing_to_draw, Fine);
+}
+
+#[test]
+fn planes_of_a_gradient_are_read_in_place_and_their_numbers_are_finite() {
+    let mut table = Table::new();
+    let make = calls::render_backward;
+    let planes = [("color", 12), ("alpha", 4), ("depth", 4)];
+    for (k, (plane, pixel)) in planes.into_iter().enumerate() {
+        let stride = calls::GRADIENT_STRIDES[k].max(48 * pixel);
+        for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            for (v, u) in [(0, 0), (17, 47), (35, 47)] {
+                let spoil = |call: &mut Call| {
+                    // The last byte of a pixel's last channel.
+                    call.inputs[k].poke(v * stride + (u + 1) * pixel - 4, bytes_of(&[value]));
+                };
+                let words = refused(&format!("gradient.{plane}[{v}][{u}]: {value}"));
+                for make in [make as fn(&World) -> Call, calls::render_backward_with_a_picture] {
+                    table.row(make, &format!("{plane}, {value}"), spoil, words.clone());
+                }
+            }
+        }
+        let without = |call: &mut Call| call.lent("gradient").put(plane, 0, 0);
+        table.row(make, &format!("no {plane}"), without, Fine);
+        // A row without gaps and one with some hold the same gradient.
+        let mut expected = make(&table.world);
+        let only = |call: &mut Call| {
+            planes.iter().filter(|p| p.0 != plane).for_each(|p| call.lent("gradient").put(p.0, 0, 0));
+        };
+        only(&mut expected);
+        assert!(expected.run(true).is_ok());
+        let mut call = make(&table.world);
+        only(&mut call);
+        let rows = calls::noise(48 * 36 * pixel / 4);
+        let mut bytes = vec![0xFF; 36 * (48 * pixel + 9)];
+        for (v, row) in bytes_of(&rows).chunks_exact(48 * pixel).enumerate() {
+            bytes[v * (48 * pixel + 9)..][..row.len()].copy_from_slice(row);
+        }
+        let mut memory = Memory::new(&bytes, 3);
+        call.lent("gradient").put(plane, 0, memory.pointer() as u64);
+        call.lent("gradient").put(&format!("{plane}_row_stride"), 0, 48 * pixel as u64 + 9);
+        call.inputs.push(memory);
+        assert!(call.run(true).is_ok());
+        assert!(written(&call) == written(&expected), "{plane} with other gaps");
+    }
+    let without = |call: &mut Call| planes.iter().for_each(|p| call.lent("gradient").put(p.0, 0, 0));
+    table.row(make, "no plane", without, refused("gradient: neither"));
+
+    let straight = |call: &mut Call| {
+        call.lent("options").put("background", 0, vg_background::Transparent as u64);
+        call.lent("options").put("alpha", 0, vg_alpha::Straight as u64);
+    };
+    table.row(make, "of straight alpha", straight, refused("options.alpha: 0 (straight)"));
+    let without_color = |call: &mut Call| {
+        straight(call);
+        call.lent("gradient").put("color", 0, 0);
+    };
+    table.row(make, "straight alpha without colour", without_color, Fine);
+}
+
+/// What a loss in C would have at hand.
+struct Loss {
+    world: *const World,
+    caller: std::thread::ThreadId,
+    /// The planes it fills, with what.
+    planes: [(*mut u8, Vec<u8>); 3],
+    answer: i32,
+    calls: usize,
+    /// What `target` held when it was called.
+    picture: Vec<u8>,
+    target: (*const u8, usize),
+}
+
+unsafe extern "C" fn loss(user: *mut c_void) -> i32 {
+    let loss = unsafe { &mut *user.cast::<Loss>() };
+    loss.calls += 1;
+    assert_eq!(std::thread::current().id(), loss.caller);
+    loss.picture = unsafe { std::slice::from_raw_parts(loss.target.0, loss.target.1) }.to_vec();
+    for (plane, bytes) in &loss.planes {
+        unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), *plane, bytes.len()) };
+    }
+    // With the same context, of which every thread waits.
+    for make in [calls::render as fn(&World) -> Call, calls::render_backward_with_a_picture] {
+        assert!(make(unsafe { &*loss.world }).run(true).is_ok());
+    }
+    loss.answer
+}
+
+#[test]
+fn a_loss_sees_the_picture_fills_the_planes_and_may_call_the_library() {
+    let mut table = Table::new();
+    let one = {
+        let mut call = calls::context_new(&table.world);
+        call.lent("options").put("threads", 0, 1);
+        call.run(true)
+    };
+    let make = calls::render_backward_with_a_picture;
+    let mut expected = make(&table.world);
+    assert!(expected.run(true).is_ok());
+    // Gradients of a call without a picture, and the picture of a call without gradients.
+    let mut apart = calls::render_backward(&table.world);
+    let mut drawn = calls::render(&table.world);
+    assert!(apart.run(true).is_ok() && drawn.run(true).is_ok());
+    assert!(written(&expected) == [written(&apart), written(&drawn)].concat());
+
+    for context in [table.world.context, one.handle("out"), 0] {
+        for (answer, spoiled) in [(0, false), (1, false), (i32::MIN, false), (0, true)] {
+            let mut call = make(&table.world);
+            call.lent("options").put("context", 0, context as u64);
+            // The planes hold noise until the loss has filled them.
+            let contents: Vec<Vec<u8>> = call.inputs.iter().map(|input| input.content().to_vec()).collect();
+            let mut planes: Vec<Vec<u8>> = contents.iter().map(|c| vec![0xFF; c.len()]).collect();
+            let names = ["color", "alpha", "depth"];
+            for (name, plane) in names.iter().zip(&mut planes) {
+                call.lent("gradient").put(name, 0, plane.as_mut_ptr().expose_provenance() as u64);
+            }
+            let mut contents = contents;
+            if spoiled {
+                contents[1][0..4].copy_from_slice(&f32::NAN.to_ne_bytes());
+            }
+            let of = |i: usize, planes: &mut [Vec<u8>]| (planes[i].as_mut_ptr(), contents[i].clone());
+            let target = &mut call.targets[8];
+            let target = (target.memory.pointer() as *const u8, target.memory.content().len());
+            let mut user = Loss {
+                world: &raw const table.world,
+                caller: std::thread::current().id(),
+                planes: [of(0, &mut planes), of(1, &mut planes), of(2, &mut planes)],
+                answer,
+                calls: 0,
+                picture: vec![],
+                target,
+            };
+            call.lent("gradient").put("loss", 0, loss as *const () as u64);
+            call.lent("gradient").put("loss_user", 0, (&raw mut user).expose_provenance() as u64);
+            // The picture was written before the loss could fail: that is promised, and not that it was not.
+            let pictures = if answer != 0 || spoiled { call.targets.split_off(8) } else { vec![] };
+            let done = call.run(true);
+            assert_eq!(user.calls, 1);
+            assert!(user.picture == written(&drawn)[0], "the picture was there");
+            match (answer, spoiled) {
+                (0, false) => {
+                    assert!(done.is_ok(), "{}", done.message);
+                    assert!(written(&call) == written(&expected));
+                }
+                (0, true) => {
+                    assert_eq!(done.status, vg_status::Argument);
+                    assert!(done.message.starts_with("gradient.alpha[0][0]: NaN"), "{}", done.message);
+                }
+                _ => {
+                    assert_eq!(done.status, vg_status::Cancelled);
+                    assert_eq!(done.message, "cancelled during loss");
+                }
+            }
+            for (picture, drawn) in pictures.iter().zip(written(&drawn)) {
+                assert!(picture.memory.content() == drawn);
+            }
+        }
+    }
+    let nothing_to_see = |call: &mut Call| {
+        call.lent("gradient").put("loss", 0, loss as *const () as u64);
+        call.arguments[3].value = Value::Null;
+    };
+    table.row(make, "a loss without a picture", nothing_to_see, refused("target: NULL"));
 }
 
 thread_local! {
@@ -1277,6 +1488,8 @@ fn many_threads_in_one_context_get_the_same_bytes() {
         call.targets[0].memory.content().to_vec()
     };
     let (straight, bent) = (picture(calls::render), picture(calls::render_through_a_lens));
+    let (back, bent_back) =
+        (picture(calls::render_backward_with_a_picture), picture(calls::render_backward_through_a_lens));
     // The world is handles, which any number of threads may use.
     struct Shared<'a>(&'a World);
     unsafe impl Sync for Shared<'_> {}
@@ -1296,6 +1509,8 @@ fn many_threads_in_one_context_get_the_same_bytes() {
                     for (make, expected) in [
                         (calls::render as fn(&World) -> Call, &straight),
                         (calls::render_through_a_lens, &bent),
+                        (calls::render_backward_with_a_picture, &back),
+                        (calls::render_backward_through_a_lens, &bent_back),
                     ] {
                         let mut call = make(world);
                         assert!(call.run(true).is_ok());
@@ -1356,7 +1571,12 @@ fn alone_threads_end_with_their_context() {
         assert_eq!(threads(), here + 7);
         drop(context);
         assert_eq!(threads_left(here), here, "vg_context_free ends its threads");
-        for make in [calls::reconstruct as fn(&World) -> Call, calls::render, calls::transforms_open] {
+        for make in [
+            calls::reconstruct as fn(&World) -> Call,
+            calls::render,
+            calls::render_backward_with_a_picture,
+            calls::transforms_open,
+        ] {
             let mut call = make(&table.world);
             call.lent("options").put("context", 0, 0);
             assert!(call.run(true).is_ok());

@@ -4,7 +4,7 @@ use crate::tools::{STRICT, assert_golden, cc, cxx, have, root, run, scratch};
 use std::process::Command;
 
 /// The chapters of the header.
-const CHAPTERS: [&str; 14] = [
+const CHAPTERS: [&str; 15] = [
     "version",
     "status",
     "context",
@@ -17,6 +17,7 @@ const CHAPTERS: [&str; 14] = [
     "gaussians",
     "reconstruct",
     "render",
+    "gradient",
     "segment",
     "scene",
 ];

@@ -27,6 +27,7 @@ mod client;
 #[path = "../common/mod.rs"]
 mod common;
 mod contents;
+mod gradients;
 mod header;
 mod layout;
 mod pictures;

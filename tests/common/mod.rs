@@ -1,9 +1,12 @@
 //! What several test programs share: a seeded generator, scenes, and comparison of pictures.
 #![allow(dead_code, unreachable_pub)] // each program uses a part, through a module of its own
 
+pub mod golden;
 pub mod npz;
 pub mod sample;
 pub mod scenes;
+pub mod stiff;
+pub mod timing;
 pub mod vehicle;
 
 use std::io::Write;

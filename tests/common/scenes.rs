@@ -1,7 +1,7 @@
 //! Scenes to render.
 
 use super::Random;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use vg::geometry::camera::Intrinsics;
 use vg::{Camera, Gaussians, Pose};
 
@@ -33,4 +33,32 @@ pub fn random(seed: u64, n: usize, sh_degree: u8, scales: [f64; 2]) -> Gaussians
         sh.extend((0..coefficients).map(|k| (r.normal() * if k < 3 { 1.0 } else { 0.2 }) as f32));
     }
     Gaussians::from_arrays(sh_degree, means, rotations, sizes, opacities, sh).unwrap()
+}
+
+/// A shell of `n` discs, 1 cm by 1 cm by 1 mm, spread evenly over an ellipsoid of 4.5 x 1.8 x 1.5 m; opacity 0.5 to
+/// 0.98; SH degree 3.
+pub fn surfel_car(n: usize) -> Gaussians {
+    const AXES: DVec3 = DVec3::new(2.25, 0.90, 0.75);
+    let mut r = Random::new(0);
+    let (mut means, mut rotations, mut opacities) = (Vec::new(), Vec::new(), Vec::new());
+    let mut sh = Vec::with_capacity(48 * n);
+    while means.len() < n {
+        let u = DVec3::new(r.normal(), r.normal(), r.normal()).normalize();
+        // The area element over its maximum.
+        if r.uniform(0.0, 1.0) >= (u / AXES).length() * AXES.min_element() {
+            continue;
+        }
+        let p = u * AXES;
+        let normal = (u / AXES).normalize();
+        let tangent = normal.cross(DVec3::new(r.normal(), r.normal(), r.normal())).normalize();
+        let q = DQuat::from_mat3(&DMat3::from_cols(tangent, normal.cross(tangent), normal));
+        means.push(p.to_array().map(|v| v as f32));
+        rotations.push([q.w, q.x, q.y, q.z].map(|v| v as f32));
+        opacities.push(r.uniform(0.5, 0.98) as f32);
+        let wave = |k: usize| (p[k] * [6.0, 9.0, 11.0][k] + k as f64).sin();
+        sh.extend([0, 1, 2].map(|k| (0.35 * wave(k) / f64::from(vg::gaussians::sh::Y0)) as f32));
+        sh.extend((3..48).map(|_| (0.04 * r.normal()) as f32));
+    }
+    let scales = vec![[0.01, 0.01, 0.001]; n];
+    Gaussians::from_arrays(3, means, rotations, scales, opacities, sh).unwrap()
 }

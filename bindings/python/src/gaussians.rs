@@ -7,11 +7,14 @@ use numpy::ndarray::ArrayView;
 use numpy::{Element, PyArray, PyArray1, PyArray2, PyArray3, PyArrayDescr, PyArrayDescrMethods};
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyString;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyString, PyType};
 use std::path::PathBuf;
 use std::sync::LazyLock;
 use vg::io::ply;
-use vg::render::{Background, CpuRenderer, RenderOptions, Rendered, Renderer};
+use vg::render::{
+    Background, CpuRenderer, DepthMode, Differentiable, PictureGradient, RenderOptions, Rendered, Renderer,
+};
 
 /// Draws for everybody: keeps its working memory, and the last lens, from picture to picture.
 static RENDERER: LazyLock<CpuRenderer> = LazyLock::new(CpuRenderer::new);
@@ -143,6 +146,112 @@ impl Gaussians {
         }
     }
 
+    /// The picture as losses look at it: Planes of color (height, width, 3), over the background or, with a
+    /// "transparent" one, premultiplied; alpha and depth (height, width). All float32; arguments as those of render,
+    /// and depth_mode, "expected" or "accumulated": depth times alpha.
+    #[pyo3(signature = (
+        camera, background=None, threads=0, *,
+        antialiased=false, near=0.01, far=1e10, sh_degree=3, depth_mode="expected"
+    ), text_signature = "(self, camera, background='white', threads=0, *, antialiased=False, near=0.01, far=1e10, \
+        sh_degree=3, depth_mode='expected')")]
+    fn render_planes<'py>(
+        &self,
+        py: Python<'py>,
+        camera: &Bound<'py, Camera>,
+        background: Option<&Bound<'py, PyAny>>,
+        threads: usize,
+        antialiased: bool,
+        near: f32,
+        far: f32,
+        sh_degree: u8,
+        depth_mode: &str,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let background = background.map_or(Ok(Background::Color([1.0; 3])), parse_background)?;
+        let depth_mode = parse_depth_mode(py, depth_mode)?;
+        let options = RenderOptions {
+            background,
+            antialiased,
+            near,
+            far,
+            sh_degree,
+            depth_mode,
+            ..RenderOptions::default()
+        };
+        let camera = &camera.get().inner;
+        let drawn = pooled(py, threads, || RENDERER.render(&self.inner, camera, &options))?;
+        let size = (drawn.height as usize, drawn.width as usize);
+        static PLANES: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        PLANES.import(py, "vehicle_gaussians._gradients", "Planes")?.call1((
+            picture(py, size, drawn.color),
+            owned(py, size, drawn.alpha),
+            owned(py, size, drawn.depth),
+        ))
+    }
+
+    /// Goes back from the gradient of a loss with respect to the planes of a picture, as render_planes draws it, to
+    /// Gradients of everything the picture is made of. color (height, width, 3), alpha and depth (height, width) are
+    /// float32, finite; None where the loss does not look. The picture is drawn again on the way.
+    ///
+    /// Constants are the order of depth, the pixels a Gaussian reaches, what is too faint to be drawn, near and far.
+    #[pyo3(signature = (
+        camera, color=None, alpha=None, depth=None, background=None, threads=0, *,
+        antialiased=false, near=0.01, far=1e10, sh_degree=3, depth_mode="expected"
+    ), text_signature = "(self, camera, color=None, alpha=None, depth=None, background='white', threads=0, *, \
+        antialiased=False, near=0.01, far=1e10, sh_degree=3, depth_mode='expected')")]
+    fn render_backward<'py>(
+        &self,
+        py: Python<'py>,
+        camera: &Bound<'py, Camera>,
+        color: Option<&Bound<'py, PyAny>>,
+        alpha: Option<&Bound<'py, PyAny>>,
+        depth: Option<&Bound<'py, PyAny>>,
+        background: Option<&Bound<'py, PyAny>>,
+        threads: usize,
+        antialiased: bool,
+        near: f32,
+        far: f32,
+        sh_degree: u8,
+        depth_mode: &str,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let background = background.map_or(Ok(Background::Color([1.0; 3])), parse_background)?;
+        let depth_mode = parse_depth_mode(py, depth_mode)?;
+        let options = RenderOptions {
+            background,
+            antialiased,
+            near,
+            far,
+            sh_degree,
+            depth_mode,
+            ..RenderOptions::default()
+        };
+        let camera = &camera.get().inner;
+        if color.is_none() && alpha.is_none() && depth.is_none() {
+            return Err(bad_value(py, "color, alpha, depth", "all None", "at least one of them"));
+        }
+        let size = (camera.height as usize, camera.width as usize);
+        let gradient = PictureGradient {
+            width: camera.width,
+            height: camera.height,
+            color: plane::<3>(color, "color", size)?.as_chunks::<3>().0.to_vec(),
+            alpha: plane::<1>(alpha, "alpha", size)?,
+            depth: plane::<1>(depth, "depth", size)?,
+        };
+        let g = pooled(py, threads, || RENDERER.backward(&self.inner, camera, &options, &gradient))?;
+        let n = self.inner.len();
+        let pose = [g.pose.rotation, g.pose.translation].map(|v| v.to_array()).concat();
+        static GRADIENTS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+        GRADIENTS.import(py, "vehicle_gaussians._gradients", "Gradients")?.call1((
+            owned(py, (n, 3), g.means.into_flattened()),
+            owned(py, (n, 3), g.scales.into_flattened()),
+            owned(py, (n, 4), g.rotations.into_flattened()),
+            owned(py, n, g.opacities),
+            owned(py, (n, self.inner.sh_stride() / 3, 3), g.sh),
+            owned(py, 3, g.background.to_vec()),
+            owned(py, 6, pose),
+            owned(py, (4, 4), g.pose.view_matrix.concat()),
+        ))
+    }
+
     /// Centres, metres. (n, 3)
     #[getter]
     fn means<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray2<f32>> {
@@ -237,6 +346,39 @@ fn parse_background(object: &Bound<'_, PyAny>) -> PyResult<Background> {
             Err(bad_value(object.py(), "background", &format!("{other:?}"), allowed))
         }
     }
+}
+
+fn parse_depth_mode(py: Python<'_>, name: &str) -> PyResult<DepthMode> {
+    match name {
+        "expected" => Ok(DepthMode::Expected),
+        "accumulated" => Ok(DepthMode::Accumulated),
+        other => Err(bad_value(py, "depth_mode", &format!("{other:?}"), "expected, accumulated")),
+    }
+}
+
+/// A plane of a picture's gradient, of `N` numbers a pixel, finite; empty for None.
+fn plane<const N: usize>(
+    object: Option<&Bound<'_, PyAny>>,
+    argument: &str,
+    (height, width): (usize, usize),
+) -> PyResult<Vec<f32>> {
+    let Some(object) = object else { return Ok(vec![]) };
+    let py = object.py();
+    let array = floats(object, argument)?;
+    let (fits, allowed) = match N {
+        1 => (array.shape() == [height, width], format!("({height}, {width})")),
+        _ => (array.shape() == [height, width, N], format!("({height}, {width}, {N})")),
+    };
+    if !fits {
+        return Err(bad_value(py, argument, &shape_text(array.shape()), &allowed));
+    }
+    let values = values(&array)?;
+    if let Some(i) = values.iter().position(|value| !value.is_finite()) {
+        let (row, column) = (i / (width * N), i % (width * N) / N);
+        let found = values[i].to_string();
+        return Err(bad_value(py, &format!("{argument}[{row}, {column}]"), &found, "finite numbers"));
+    }
+    Ok(values.to_vec())
 }
 
 /// What the numbers of a picture are.

@@ -12,6 +12,7 @@ use pyo3::types::PyString;
 use std::ops::ControlFlow;
 use vg::pipeline::{Calibrate, Keep, Options, PriorChoice};
 use vg::progress::Progress;
+use vg::refine::{Amount, RefineOptions};
 use vg::relight::Relight;
 use vg::scene::image::PixelFormat;
 use vg::scene::mask::VEHICLE_THRESHOLD;
@@ -26,7 +27,8 @@ type Points<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>);
 #[pyfunction]
 #[pyo3(signature = (
     images, masks, cameras, depths, *, prior, prior_model, head_model, calibrate, symmetry, relight, photo, cloud,
-    vehicle_size, sh_degree, keep, check, points, budget, resolution, max_views, threads, names, progress
+    vehicle_size, sh_degree, keep, check, points, budget, resolution, max_views, refine_iterations,
+    refine_seconds, refine_hold_out, threads, names, progress
 ))]
 pub(crate) fn reconstruct<'py>(
     py: Python<'py>,
@@ -50,6 +52,9 @@ pub(crate) fn reconstruct<'py>(
     budget: Option<f64>,
     resolution: f64,
     max_views: Option<usize>,
+    refine_iterations: Option<u32>,
+    refine_seconds: Option<f64>,
+    refine_hold_out: bool,
     threads: usize,
     names: Option<Vec<String>>,
     progress: Option<Py<PyAny>>,
@@ -71,6 +76,7 @@ pub(crate) fn reconstruct<'py>(
         max_views,
         threads,
         points,
+        refine: refinement(py, refine_iterations, refine_seconds, refine_hold_out)?,
     };
     // Before the pixels are copied.
     options.validate().map_err(|e| from_library(py, e))?;
@@ -102,6 +108,34 @@ pub(crate) fn reconstruct<'py>(
         (positions, owned(py, (n, 3), cloud.colors.into_flattened()))
     });
     Ok((Gaussians { inner: made.gaussians }, report, points))
+}
+
+/// By a number of steps, or by the time they take.
+fn refinement(
+    py: Python<'_>,
+    iterations: Option<u32>,
+    seconds: Option<f64>,
+    hold_out: bool,
+) -> PyResult<Option<RefineOptions>> {
+    let amount = match (iterations, seconds) {
+        (None, None) => return Ok(None),
+        (Some(0), _) => return Err(bad_value(py, "refine_iterations", "0", "1 to 1000000")),
+        (Some(steps), None) => Amount::Iterations(steps),
+        (None, Some(seconds)) => Amount::Seconds(seconds),
+        (Some(steps), Some(seconds)) => {
+            let found = format!("{seconds}, with refine_iterations {steps}");
+            return Err(bad_value(py, "refine_seconds", &found, "one of both"));
+        }
+    };
+    let options = RefineOptions { amount, hold_out, ..RefineOptions::default() };
+    match options.validate() {
+        Err(vg::Error::Argument { argument, found, allowed }) => {
+            let name = argument.trim_start_matches("options.").replace('.', "_");
+            Err(bad_value(py, &name, &found, &allowed))
+        }
+        Err(other) => Err(from_library(py, other)),
+        Ok(()) => Ok(Some(options)),
+    }
 }
 
 /// Whether to go on: not after Ctrl-C, an exception of the caller's function, or its true value.

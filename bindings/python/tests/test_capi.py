@@ -146,12 +146,17 @@ def test_options_are_those_of_the_extension_module(ellipsoid: Views, made: vg.Re
         "budget": 1e6,
         "resolution": 0.75,
         "max_views": 3,
+        "refine_iterations": 3,
+        "refine_hold_out": True,
     }
     ours, theirs = vg.reconstruct(*views, **given), capi.reconstruct(*views, **given)
     assert same_bytes(ours.gaussians, theirs.gaussians)
     assert ours.report["cloud"] == theirs.report["cloud"] and ours.report["cloud"]["used"] > 0
     for name in ("prior", "calibrate", "symmetry", "relight", "photo", "check", "resolution", "max_views"):
         assert ours.report["settings"][name] == theirs.report["settings"][name] == given[name]
+    refinement = ours.report["refinement"]
+    assert refinement == theirs.report["refinement"] and refinement["iterations"] == 3
+    assert refinement["held_out"]["view"] == "001"
     # The settings are what a budget chose; the budget itself is in the plan.
     assert ours.report["plan"]["budget_s"] == theirs.report["plan"]["budget_s"] == given["budget"]
     # Another order in memory is copied; no points are no cloud.
@@ -397,6 +402,10 @@ def test_errors_have_the_same_codes_and_texts(ellipsoid: Views, tmp_path: Path) 
         ({"budget": -1}, "options.budget_s: -1"),
         ({"resolution": 0}, "options.resolution: 0; allowed: above 0, at most 1"),
         ({"max_views": 0}, "max_views: 0; allowed: at least 1"),
+        ({"refine_iterations": 0}, "refine_iterations: 0; allowed: 1 to 1000000"),
+        ({"refine_iterations": 2_000_000}, "options.refine_iterations: 2000000; allowed: at most 1000000"),
+        ({"refine_seconds": 0}, "refine_seconds: 0; allowed: above 0, at most 86400"),
+        ({"refine_seconds": 2, "refine_iterations": 5}, "options.refine_seconds: 2, with refine_iterations 5"),
         ({"cloud": np.zeros((4, 2), np.float32)}, "cloud: shape (4, 2); allowed: (n, 3)"),
         ({"cloud": np.full((4, 3), np.nan, np.float32)}, "options.cloud[0]: [NaN, NaN, NaN]; allowed: finite"),
         ({"masks": []}, "masks: 0 entries; allowed: 4, one per image"),

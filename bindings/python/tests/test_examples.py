@@ -90,3 +90,11 @@ def test_the_unseen_side_comes_through_ctypes_alone(tmp_path: Path, unseen: vg.S
         with Image.open(tmp_path / "out" / name) as picture:
             assert psnr(np.asarray(picture), on_white(image, mask)) > 21
     assert unseen_psnr(tmp_path / "out" / "car.ply", unseen) > 24.9
+
+
+def test_a_shaken_model_is_fitted_back(tmp_path: Path, sedan_made: vg.Reconstruction, sedan: vg.Scene) -> None:
+    pytest.importorskip("torch", reason="PyTorch is not installed")
+    said = run("fit_with_torch.py", "--steps", "25", "-o", "car.ply", cwd=tmp_path).strip().splitlines()
+    quality = [float(line.split()[2]) for line in said]
+    assert len(quality) == 4 and quality[-1] > quality[0] + 3, said
+    assert len(vg.Gaussians.load_ply(tmp_path / "car.ply")) == len(sedan_made.gaussians)

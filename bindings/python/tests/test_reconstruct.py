@@ -125,6 +125,7 @@ def test_options_reach_the_library(ellipsoid: Views) -> None:
         budget=1e6,
         resolution=0.5,
         max_views=2,
+        refine_seconds=0.01,
         threads=1,
     )
     settings = made.report["settings"]
@@ -138,6 +139,7 @@ def test_options_reach_the_library(ellipsoid: Views) -> None:
     assert made.report["plan"]["budget_s"] == 1e6
     assert (settings["resolution"], settings["max_views"]) == (0.5, 2)
     assert len(made.report["views_used"]) == 2
+    assert made.report["refinement"]["iterations"] >= 4
     assert made.report["calibration"] is None and made.report["relight"] is None
 
 

@@ -5,6 +5,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
 use vg::onnx::{Model, ModelOptions, Provider};
 use vg::pipeline::{Calibrate, Keep, Options, PriorChoice};
+use vg::refine::{Amount, RefineOptions};
 use vg::relight::Relight;
 use vg::render::Background;
 use vg::symmetry::SymmetryMode;
@@ -88,6 +89,9 @@ pub(crate) struct MethodArgs {
     /// Use at most this many views, those that spread best around the vehicle
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     max_views: Option<usize>,
+    /// Optimise the model against the photographs: so many steps (300), or as many as fit into so many seconds (5s)
+    #[arg(long, value_name = "N|SECONDSs", value_parser = refinement)]
+    refine: Option<Amount>,
     /// Do not move the shape prior's surface to where the photographs agree
     #[arg(long)]
     no_photo: bool,
@@ -166,6 +170,7 @@ impl MethodArgs {
             max_views: self.max_views,
             threads: self.threads,
             points: false,
+            refine: self.refine.map(|amount| RefineOptions { amount, ..RefineOptions::default() }),
         }
     }
 }
@@ -403,6 +408,19 @@ fn positive(text: &str) -> Result<f64, String> {
         .ok()
         .filter(|value: &f64| *value > 0.0 && value.is_finite())
         .ok_or_else(|| "expected a number above 0".into())
+}
+
+fn refinement(text: &str) -> Result<Amount, String> {
+    let amount = match text.strip_suffix('s') {
+        Some(seconds) => seconds.parse().ok().map(Amount::Seconds),
+        None => text.parse().ok().map(Amount::Iterations),
+    };
+    let amount = amount.ok_or("expected a number of steps (300) or of seconds (5s)")?;
+    match (RefineOptions { amount, ..RefineOptions::default() }).validate() {
+        Ok(()) => Ok(amount),
+        Err(vg::Error::Argument { allowed, .. }) => Err(format!("expected {allowed}")),
+        Err(other) => Err(other.to_string()),
+    }
 }
 
 fn share(text: &str) -> Result<f64, String> {

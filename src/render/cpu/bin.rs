@@ -26,6 +26,20 @@ impl Grid {
     }
 }
 
+/// A rectangle of tiles.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Window {
+    pub(super) columns: Range<usize>,
+    pub(super) rows: Range<usize>,
+}
+
+impl Grid {
+    /// All tiles.
+    pub(super) fn window(self) -> Window {
+        Window { columns: 0..self.columns, rows: 0..self.rows }
+    }
+}
+
 /// One splat in one tile: its index, and the rows and blocks of the tile that it may touch. Splats behind a
 /// finished part of the picture are told by the entry alone, without fetching them from memory.
 #[derive(Clone, Copy, Debug, Default)]
@@ -63,6 +77,10 @@ fn tile_columns(b: &PixelBounds) -> Range<usize> {
     usize::from(b.x0) / TILE_WIDTH..usize::from(b.x1) / TILE_WIDTH + 1
 }
 
+fn both(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
+    a.start.max(b.start)..a.end.min(b.end)
+}
+
 fn tile_rows(b: &PixelBounds) -> Range<usize> {
     usize::from(b.y0) / TILE_HEIGHT..usize::from(b.y1) / TILE_HEIGHT + 1
 }
@@ -74,9 +92,8 @@ fn pairs(b: &PixelBounds) -> u64 {
 /// Consecutive bands with the list of each of their tiles.
 #[derive(Debug, Default)]
 pub(super) struct Stripe {
-    first_row: usize,
-    rows: usize,
-    columns: usize,
+    columns: Range<usize>,
+    rows: Range<usize>,
     /// Where each tile's list ends. `[rows * columns]`
     ends: Vec<u32>,
     /// Tile after tile, nearest first.
@@ -86,23 +103,23 @@ pub(super) struct Stripe {
 impl Stripe {
     /// The splats of the tile in column `column` of band `row` of the image, nearest first.
     pub(super) fn tile(&self, column: usize, row: usize) -> &[Entry] {
-        let tile = (row - self.first_row) * self.columns + column;
+        let tile = (row - self.rows.start) * self.columns.len() + (column - self.columns.start);
         let start = if tile == 0 { 0 } else { self.ends[tile - 1] };
         &self.entries[start as usize..self.ends[tile] as usize]
     }
 
-    fn fill(&mut self, grid: Grid, first_row: usize, rows: usize, order: &[u32], bounds: &[PixelBounds]) {
-        (self.first_row, self.rows, self.columns) = (first_row, rows, grid.columns);
-        let own_rows = |b: &PixelBounds| {
-            let all = tile_rows(b);
-            all.start.max(first_row)..all.end.min(first_row + rows)
-        };
+    fn fill(&mut self, window: Window, order: &[u32], bounds: &[PixelBounds]) {
+        let Window { columns, rows } = window;
+        // Tile (row, column) is number `row * width + column - first`.
+        let width = columns.len();
+        let first = rows.start * width + columns.start;
         self.ends.clear();
-        self.ends.resize(rows * grid.columns, 0);
+        self.ends.resize(rows.len() * width, 0);
         for b in bounds {
-            for row in own_rows(b) {
-                for column in tile_columns(b) {
-                    self.ends[(row - first_row) * grid.columns + column] += 1;
+            let own_columns = both(&tile_columns(b), &columns);
+            for row in both(&tile_rows(b), &rows) {
+                for column in own_columns.clone() {
+                    self.ends[row * width + column - first] += 1;
                 }
             }
         }
@@ -113,15 +130,17 @@ impl Stripe {
         }
         self.entries.resize(total as usize, Entry::default());
         for (b, &splat) in bounds.iter().zip(order) {
-            for row in own_rows(b) {
-                for column in tile_columns(b) {
-                    let end = &mut self.ends[(row - first_row) * grid.columns + column];
+            let own_columns = both(&tile_columns(b), &columns);
+            for row in both(&tile_rows(b), &rows) {
+                for column in own_columns.clone() {
+                    let end = &mut self.ends[row * width + column - first];
                     self.entries[*end as usize] =
                         Entry::new(splat, *b, column * TILE_WIDTH, row * TILE_HEIGHT);
                     *end += 1;
                 }
             }
         }
+        (self.columns, self.rows) = (columns, rows);
     }
 }
 
@@ -140,20 +159,110 @@ pub(super) fn slice_len(bounds: &[PixelBounds], budget: u64) -> usize {
     fitting.map_or(bounds.len(), |n| n.max(1))
 }
 
-/// Bins one slice of the depth order; `stripes` is reused from picture to picture.
-pub(super) fn bin(grid: Grid, order: &[u32], bounds: &[PixelBounds], stripes: &mut Vec<Stripe>) {
+/// Cuts the picture into windows of at most `budget` pairs each, or of one tile; row by row.
+pub(super) fn windows(grid: Grid, bounds: &[PixelBounds], budget: u64) -> Vec<Window> {
+    // Pairs in each band: added where a splat begins, taken away after it ends.
+    let mut steps = vec![0i64; grid.rows + 1];
+    for b in bounds {
+        let (columns, rows) = (tile_columns(b).len() as i64, tile_rows(b));
+        steps[rows.start] += columns;
+        steps[rows.end] -= columns;
+    }
+    let mut windows: Vec<Window> = Vec::new();
+    let (mut in_band, mut in_window) = (0, 0);
+    for row in 0..grid.rows {
+        in_band += steps[row];
+        let pairs = in_band as u64;
+        if pairs > budget {
+            windows.extend(windows_of_band(grid, bounds, budget, row));
+            // Nothing may join it.
+            in_window = budget + 1;
+        } else if let Some(last) = windows.last_mut().filter(|_| in_window + pairs <= budget) {
+            last.rows.end = row + 1;
+            in_window += pairs;
+        } else {
+            windows.push(Window { columns: 0..grid.columns, rows: row..row + 1 });
+            in_window = pairs;
+        }
+    }
+    windows
+}
+
+fn windows_of_band(grid: Grid, bounds: &[PixelBounds], budget: u64, row: usize) -> Vec<Window> {
+    let mut steps = vec![0i64; grid.columns + 1];
+    for b in bounds.iter().filter(|b| tile_rows(b).contains(&row)) {
+        let columns = tile_columns(b);
+        steps[columns.start] += 1;
+        steps[columns.end] -= 1;
+    }
+    let mut windows: Vec<Window> = Vec::new();
+    let (mut in_tile, mut in_window) = (0, 0);
+    for column in 0..grid.columns {
+        in_tile += steps[column];
+        let pairs = in_tile as u64;
+        match windows.last_mut() {
+            Some(last) if in_window + pairs <= budget => {
+                last.columns.end = column + 1;
+                in_window += pairs;
+            }
+            _ => {
+                windows.push(Window { columns: column..column + 1, rows: row..row + 1 });
+                in_window = pairs;
+            }
+        }
+    }
+    windows
+}
+
+/// Bins one slice of the depth order, or one window of all of it; `stripes` is reused from picture to picture.
+pub(super) fn bin(window: &Window, order: &[u32], bounds: &[PixelBounds], stripes: &mut Vec<Stripe>) {
     // Each stripe scans everything, so no more of them than there are threads.
-    let count = rayon::current_num_threads().clamp(1, grid.rows);
+    let rows = window.rows.len();
+    let count = rayon::current_num_threads().clamp(1, rows);
     stripes.resize_with(count, Stripe::default);
     stripes.par_iter_mut().enumerate().for_each(|(i, stripe)| {
-        let first = i * grid.rows / count;
-        let end = (i + 1) * grid.rows / count;
-        stripe.fill(grid, first, end - first, order, bounds);
+        let own = window.rows.start + i * rows / count..window.rows.start + (i + 1) * rows / count;
+        stripe.fill(Window { columns: window.columns.clone(), rows: own }, order, bounds);
     });
 }
 
 /// The stripe that holds band `row`.
 pub(super) fn stripe_of(stripes: &[Stripe], row: usize) -> &Stripe {
-    let i = stripes.partition_point(|s| s.first_row + s.rows <= row);
+    let i = stripes.partition_point(|s| s.rows.end <= row);
     &stripes[i]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_hold_every_tile_once_in_order_and_no_more_pairs_than_allowed() {
+        let grid = Grid::new(300, 100);
+        let at = |i: usize, k: usize, n: usize| ((i * 7919 + k * 104_729) % 1009 % n) as u16;
+        let bounds: Vec<PixelBounds> = (0..500)
+            .map(|i| {
+                let (x0, y0) = (at(i, 0, 300), at(i, 1, 100));
+                let (x1, y1) = ((x0 + at(i, 2, 150)).min(299), (y0 + at(i, 3, 40)).min(99));
+                PixelBounds { x0, x1, y0, y1 }
+            })
+            .collect();
+        let mut pairs = vec![0; grid.rows * grid.columns];
+        for b in &bounds {
+            for row in tile_rows(b) {
+                tile_columns(b).for_each(|column| pairs[row * grid.columns + column] += 1);
+            }
+        }
+        for budget in [1, 100, 400, 1000, 5000, 1_000_000] {
+            let windows = windows(grid, &bounds, budget);
+            let mut seen = Vec::new();
+            for Window { columns, rows } in windows {
+                let before = seen.len();
+                rows.for_each(|r| seen.extend(columns.clone().map(|c| r * grid.columns + c)));
+                let held: u64 = seen[before..].iter().map(|&tile| pairs[tile]).sum();
+                assert!(held <= budget || seen.len() == before + 1, "{held} of {budget}");
+            }
+            assert_eq!(seen, (0..pairs.len()).collect::<Vec<usize>>(), "{budget}");
+        }
+    }
 }

@@ -15,20 +15,50 @@ use pulp::f32x8;
 /// Splats fetched at a time: their cache misses overlap here, which they cannot while one is being blended.
 const BATCH: usize = 32;
 
+/// Told of everything that is drawn, in order; the picture alone needs none of it.
+pub(super) trait Record {
+    /// Whether the tile's colour is wanted; its transmittance and depth are there always.
+    const COLOR: bool;
+
+    /// Eight rows of a splat follow: at most 64 blocks.
+    fn rows(&mut self);
+
+    /// Block `block` of the tile had transmittance `t` (negative: finished) before `alpha` was drawn on it, which
+    /// is 0 in lanes that drew nothing.
+    fn block<S: Lanes>(&mut self, simd: S, block: usize, alpha: f32x8, t: f32x8);
+
+    /// Splat number `splat` has been drawn.
+    fn splat(&mut self, splat: usize);
+}
+
+/// Nothing is remembered.
+pub(super) struct Forget;
+
+impl Record for Forget {
+    const COLOR: bool = true;
+
+    #[inline(always)]
+    fn rows(&mut self) {}
+
+    #[inline(always)]
+    fn block<S: Lanes>(&mut self, _: S, _: usize, _: f32x8, _: f32x8) {}
+
+    #[inline(always)]
+    fn splat(&mut self, _: usize) {}
+}
+
 /// Blends the splats that `list` names, nearest first, into the tile whose first pixel is `origin`.
 #[inline(always)]
-pub(super) fn blend<S: Lanes>(
+pub(super) fn blend<S: Lanes, R: Record>(
     simd: S,
     tile: &mut Tile,
     origin: [usize; 2],
     list: &[Entry],
     splats: &[Splat],
     max_alpha: f32,
+    record: &mut R,
 ) {
-    let mut x = [pixel_centers(origin[0]); BLOCKS];
-    for (at, x) in x.iter_mut().enumerate() {
-        *x = pixel_centers(origin[0] + at * BLOCK);
-    }
+    let x = block_centers(origin[0]);
     let mut entries = [Entry::default(); BATCH];
     let mut batch = [Splat::default(); BATCH];
     for list in list.chunks(BATCH) {
@@ -45,7 +75,8 @@ pub(super) fn blend<S: Lanes>(
             *slot = splats[entry.splat()];
         }
         for (entry, splat) in entries[..count].iter().zip(&batch) {
-            blend_splat(simd, tile, origin, &x, *entry, splat, max_alpha);
+            blend_splat(simd, tile, origin, &x, *entry, splat, max_alpha, record);
+            record.splat(entry.splat());
         }
     }
 }
@@ -88,7 +119,7 @@ struct Footprint {
 }
 
 #[inline(always)]
-fn blend_splat<S: Lanes>(
+fn blend_splat<S: Lanes, R: Record>(
     simd: S,
     tile: &mut Tile,
     [left, top]: [usize; 2],
@@ -96,6 +127,7 @@ fn blend_splat<S: Lanes>(
     entry: Entry,
     splat: &Splat,
     max_alpha: f32,
+    record: &mut R,
 ) {
     let [first_row, last_row] = entry.rows();
     let footprint = Footprint::new(simd, splat);
@@ -107,6 +139,7 @@ fn blend_splat<S: Lanes>(
     // The same blocks in each of eight rows.
     let columns = u64::from(entry.blocks()) * 0x0101_0101_0101_0101;
     for row in (first_row..=last_row).step_by(BLOCK) {
+        record.rows();
         let rows = footprint.rows(simd, left, top + row);
         let mut live = [0; BLOCK];
         live.copy_from_slice(&tile.live[row..row + BLOCK]);
@@ -122,7 +155,9 @@ fn blend_splat<S: Lanes>(
             let alpha = simd.mul_f32s(opacity, simd::exp2(simd, exponent));
             let alpha = simd.min_f32s(alpha, max_alpha);
             let block = &mut tile.blocks[row * BLOCKS + i];
-            composite(simd, block, alpha, color, depth);
+            let t = block.transmittance;
+            let drawn = composite::<S, R>(simd, block, alpha, color, depth);
+            record.block(simd, row * BLOCKS + i, drawn, t);
             if simd.sign_bits(block.transmittance) == 0xff {
                 tile.live[row + r] &= !(1 << at);
             }
@@ -130,7 +165,18 @@ fn blend_splat<S: Lanes>(
     }
 }
 
+/// x of the pixel centres of each block of a tile that begins at column `left`.
+#[inline(always)]
+pub(super) fn block_centers(left: usize) -> [f32x8; BLOCKS] {
+    let mut x = [pixel_centers(left); BLOCKS];
+    for (at, x) in x.iter_mut().enumerate() {
+        *x = pixel_centers(left + at * BLOCK);
+    }
+    x
+}
+
 /// x of the centres of eight pixels.
+#[inline(always)]
 fn pixel_centers(left: usize) -> f32x8 {
     let x = left as f32 + 0.5;
     f32x8(x, x + 1.0, x + 2.0, x + 3.0, x + 4.0, x + 5.0, x + 6.0, x + 7.0)
@@ -219,8 +265,15 @@ fn block_of<S: Lanes>(simd: S, x: f32x8) -> pulp::u32x8 {
 }
 
 /// C += T alpha colour, D += T alpha z, T *= 1 - alpha where alpha counts and the pixel is not finished by it.
+/// Returns alpha where it was drawn, else 0.
 #[inline(always)]
-fn composite<S: Lanes>(simd: S, block: &mut Block, alpha: f32x8, color: [f32x8; 3], depth: f32x8) {
+fn composite<S: Lanes, R: Record>(
+    simd: S,
+    block: &mut Block,
+    alpha: f32x8,
+    color: [f32x8; 3],
+    depth: f32x8,
+) -> f32x8 {
     let t = block.transmittance;
     let next = simd.mul_f32s(t, simd.sub_f32s(simd.splat_f32s(1.0), alpha));
     // False for a NaN, which a form that has overflowed may give.
@@ -230,10 +283,13 @@ fn composite<S: Lanes>(simd: S, block: &mut Block, alpha: f32x8, color: [f32x8; 
     let drawn = simd.and_m32s(counts, open);
 
     let weight = simd.select_f32s(drawn, simd.mul_f32s(t, alpha), simd.splat_f32s(0.0));
-    for c in 0..3 {
-        block.color[c] = simd.mul_add(weight, color[c], block.color[c]);
+    if R::COLOR {
+        for c in 0..3 {
+            block.color[c] = simd.mul_add(weight, color[c], block.color[c]);
+        }
     }
     block.depth = simd.mul_add(weight, depth, block.depth);
     let closed = simd.select_f32s(counts, simd.or_f32s(t, simd.splat_f32s(-0.0)), t);
     block.transmittance = simd.select_f32s(drawn, next, closed);
+    simd.select_f32s(drawn, alpha, simd.splat_f32s(0.0))
 }

@@ -4,9 +4,11 @@
 //! It runs in the rayon pool it is called from and draws the same bytes with any number of threads.
 //! `docs/RENDERER.md` has the measurements behind each choice.
 
+mod backward;
 mod bin;
 mod blend;
 mod color;
+mod gradients;
 mod project;
 mod simd;
 mod sort;
@@ -19,7 +21,11 @@ use crate::gaussians::Gaussians;
 use crate::geometry::Camera;
 use crate::render::distorted::LensMap;
 use crate::render::{RenderOptions, Rendered, Renderer};
+use backward::BackwardScratch;
+pub use backward::BackwardTimes;
 use bin::{Grid, Stripe};
+use blend::Forget;
+pub use gradients::GradientTimes;
 use rayon::prelude::*;
 use simd::Lanes;
 use splat::{PixelBounds, Splat};
@@ -75,6 +81,7 @@ struct Scratch {
     /// In depth order.
     bounds: Vec<PixelBounds>,
     stripes: Vec<Stripe>,
+    backward: BackwardScratch,
 }
 
 impl Default for CpuRenderer {
@@ -174,23 +181,47 @@ fn draw<S: Lanes>(
     scratch: &mut Scratch,
     target: &mut Rendered,
 ) -> StageTimes {
+    let mut times = prepare(simd, gaussians, camera, options, scratch);
+    blend_in_slices(simd, camera, options, pair_budget, scratch, target, &mut times);
+    times
+}
+
+/// Splats, their depth order and their bounds in it.
+fn prepare<S: Lanes>(
+    simd: S,
+    gaussians: &Gaussians,
+    camera: &Camera,
+    options: &RenderOptions,
+    scratch: &mut Scratch,
+) -> StageTimes {
     let view = PinholeView::new(camera, options, gaussians.sh_degree());
     let start = Instant::now();
     project_all(simd, &view, gaussians, scratch);
     let projected = Instant::now();
     sort_by_depth(scratch);
     let sorted = Instant::now();
-
-    let grid = Grid::new(camera.width, camera.height);
-    let Scratch { splats, pixel_bounds, order, bounds, stripes, .. } = scratch;
-    resize(target, camera.width, camera.height);
-    bin::bounds_in_order(order, pixel_bounds, bounds);
-    let mut times = StageTimes {
+    bin::bounds_in_order(&scratch.order, &scratch.pixel_bounds, &mut scratch.bounds);
+    StageTimes {
         project: projected - start,
         sort: sorted - projected,
         bin: sorted.elapsed(),
         blend: Duration::ZERO,
-    };
+    }
+}
+
+/// Draws what is prepared; whether it took one slice, so that the stripes list the whole picture.
+fn blend_in_slices<S: Lanes>(
+    simd: S,
+    camera: &Camera,
+    options: &RenderOptions,
+    pair_budget: u64,
+    scratch: &mut Scratch,
+    target: &mut Rendered,
+    times: &mut StageTimes,
+) -> bool {
+    let grid = Grid::new(camera.width, camera.height);
+    let Scratch { splats, order, bounds, stripes, .. } = scratch;
+    resize(target, camera.width, camera.height);
     let mut drawn = 0;
     // Runs once for an empty scene too, to draw the background.
     loop {
@@ -199,13 +230,13 @@ fn draw<S: Lanes>(
         let slice = drawn..drawn + bin::slice_len(&bounds[drawn..], pair_budget);
         drawn = slice.end;
         let last = drawn == order.len();
-        bin::bin(grid, &order[slice.clone()], &bounds[slice], stripes);
+        bin::bin(&grid.window(), &order[slice.clone()], &bounds[slice], stripes);
         let binned = Instant::now();
         let unfinished = blend_all(simd, grid, stripes, splats, options, target, [first, last]);
         times.bin += binned - begin;
         times.blend += binned.elapsed();
         if last {
-            return times;
+            return first;
         }
         if !unfinished {
             // Nothing farther can show; an empty slice completes the picture.
@@ -277,7 +308,10 @@ fn blend_all<S: Lanes>(
             let list = stripe.tile(column, row);
             simd.vectorize(
                 #[inline(always)]
-                || blend::blend(simd, tile, [x0, row * TILE_HEIGHT], list, splats, options.max_alpha),
+                || {
+                    let origin = [x0, row * TILE_HEIGHT];
+                    blend::blend(simd, tile, origin, list, splats, options.max_alpha, &mut Forget);
+                },
             );
             if last {
                 tile.store_finished(&mut planes, x0, options);

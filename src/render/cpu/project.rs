@@ -19,7 +19,8 @@ pub(super) const NOT_DRAWN: u32 = u32::MAX;
 /// log2(e) / 2: sigma = 0.5 d^T Sigma^-1 d in base 2.
 const HALF_LOG2_E: f64 = 0.5 * std::f64::consts::LOG2_E;
 
-const LANES: usize = 8;
+/// Gaussians projected together.
+pub(super) const LANES: usize = 8;
 
 /// Projects the Gaussians of `range` into `splats`, `bounds` (the pixels they may touch) and `keys` (bits of z, or [`NOT_DRAWN`]); those that
 /// are not drawn keep an old splat.
@@ -83,16 +84,16 @@ pub(super) fn project(
 
 /// Eight Gaussians, transposed so that a lane is a Gaussian.
 #[derive(Default)]
-struct Inputs {
-    mean: [[f32; LANES]; 3],
-    rotation: [[f32; LANES]; 4],
-    scale: [[f32; LANES]; 3],
-    opacity: [f32; LANES],
+pub(super) struct Inputs {
+    pub(super) mean: [[f32; LANES]; 3],
+    pub(super) rotation: [[f32; LANES]; 4],
+    pub(super) scale: [[f32; LANES]; 3],
+    pub(super) opacity: [f32; LANES],
 }
 
 impl Inputs {
     #[inline(always)]
-    fn load(&mut self, l: usize, gaussians: &Gaussians, i: usize) {
+    pub(super) fn load(&mut self, l: usize, gaussians: &Gaussians, i: usize) {
         for k in 0..3 {
             self.mean[k][l] = gaussians.means()[i][k];
             self.scale[k][l] = gaussians.scales()[i][k];
@@ -230,7 +231,7 @@ fn project_lane(view: &PinholeView, g: &Inputs, out: &mut Outputs, l: usize) {
 }
 
 #[inline(always)]
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 

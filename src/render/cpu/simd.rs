@@ -16,6 +16,9 @@ pub(super) trait Lanes: Simd<f32s = f32x8, u32s = u32x8, i32s = i32x8, m32s = m3
 
     /// a b + c, fused where that is an instruction: pulp's own on plain arrays calls the C library per lane.
     fn mul_add(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8;
+
+    /// Lane l is the sum of the lanes of `v[l]`.
+    fn sums(self, v: [f32x8; 8]) -> f32x8;
 }
 
 impl Lanes for Scalar256b {
@@ -43,6 +46,16 @@ impl Lanes for Scalar256b {
     fn mul_add(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8 {
         self.add_f32s(self.mul_f32s(a, b), c)
     }
+
+    #[inline(always)]
+    fn sums(self, v: [f32x8; 8]) -> f32x8 {
+        let mut out = [0.0; 8];
+        for (out, v) in out.iter_mut().zip(v) {
+            let v: [f32; 8] = pulp::cast(v);
+            *out = ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7]));
+        }
+        pulp::cast(out)
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -63,6 +76,21 @@ impl Lanes for pulp::x86::V3 {
     #[inline(always)]
     fn mul_add(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8 {
         self.mul_add_f32s(a, b, c)
+    }
+
+    #[inline(always)]
+    fn sums(self, v: [f32x8; 8]) -> f32x8 {
+        // Pairs, then fours, within halves; then low half to low half.
+        let avx = self.avx;
+        let v01 = avx._mm256_hadd_ps(pulp::cast(v[0]), pulp::cast(v[1]));
+        let v23 = avx._mm256_hadd_ps(pulp::cast(v[2]), pulp::cast(v[3]));
+        let v45 = avx._mm256_hadd_ps(pulp::cast(v[4]), pulp::cast(v[5]));
+        let v67 = avx._mm256_hadd_ps(pulp::cast(v[6]), pulp::cast(v[7]));
+        let low = avx._mm256_hadd_ps(v01, v23);
+        let high = avx._mm256_hadd_ps(v45, v67);
+        let first = avx._mm256_permute2f128_ps::<0x20>(low, high);
+        let second = avx._mm256_permute2f128_ps::<0x31>(low, high);
+        pulp::cast(avx._mm256_add_ps(first, second))
     }
 }
 

@@ -63,7 +63,11 @@ impl Tile {
 
     /// Nothing drawn yet. Pixels outside the picture count as finished.
     pub(super) fn clear(&mut self, planes: &Planes, x0: usize) {
-        let (rows, columns) = (planes.rows(), planes.columns(x0));
+        self.clear_part(planes.columns(x0), planes.rows());
+    }
+
+    /// Nothing drawn yet on the first `columns` and `rows`; what lies beyond them counts as finished.
+    pub(super) fn clear_part(&mut self, columns: usize, rows: usize) {
         for (r, row) in self.blocks.chunks_exact_mut(BLOCKS).enumerate() {
             let mut live = 0;
             for (b, block) in row.iter_mut().enumerate() {
@@ -157,7 +161,7 @@ impl Tile {
     }
 }
 
-fn lanes(v: &f32x8) -> &[f32; BLOCK] {
+pub(super) fn lanes(v: &f32x8) -> &[f32; BLOCK] {
     bytemuck::cast_ref(v)
 }
 

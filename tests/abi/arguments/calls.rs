@@ -142,6 +142,13 @@ fn budget() -> Tries {
         .collect()
 }
 
+/// Seconds, 0 for none, few enough to be tried.
+fn refine_seconds() -> Tries {
+    let good = [0.0f64, -0.0, 1e-9].map(|v| (v.to_bits(), Fine));
+    let bad = [-1.0f64, -5e-324, 86401.0].map(|v| (v.to_bits(), Refused));
+    good.into_iter().chain(bad).chain(finite()).collect()
+}
+
 fn sizes() -> Tries {
     [0, 8193, 1 << 31, u32::MAX].map(|v| (u64::from(v), Refused)).to_vec()
 }
@@ -808,7 +815,7 @@ const SIMILARITY: [f64; 16] =
 const POSE: [f64; 12] = [0.0, -1.0, 0.0, 4e5, 1.0, 0.0, 0.0, 5e6, 0.0, 0.0, 1.0, 100.0];
 
 /// A call that works, for each function that can fail.
-pub const CALLS: [fn(&World) -> Call; 35] = [
+pub const CALLS: [fn(&World) -> Call; 40] = [
     context_options_init,
     context_new,
     camera_init,
@@ -838,6 +845,11 @@ pub const CALLS: [fn(&World) -> Call; 35] = [
     image_target_init,
     render,
     render_through_a_lens,
+    image_gradient_init,
+    gradients_init,
+    render_backward,
+    render_backward_through_a_lens,
+    render_backward_with_a_picture,
     segment_options_init,
     segment,
     scene_options_init,
@@ -847,7 +859,7 @@ pub const CALLS: [fn(&World) -> Call; 35] = [
 ];
 
 /// `sizeof` in the release that introduced them: no caller has shorter ones.
-pub const FIRST_SIZES: [(&str, usize); 11] = [
+pub const FIRST_SIZES: [(&str, usize); 13] = [
     ("vg_context_options", 16),
     ("vg_camera", 280),
     ("vg_view", 392),
@@ -857,6 +869,8 @@ pub const FIRST_SIZES: [(&str, usize); 11] = [
     ("vg_gaussian_arrays", 64),
     ("vg_render_options", 72),
     ("vg_image_target", 56),
+    ("vg_image_gradient", 88),
+    ("vg_gradients", 88),
     ("vg_segment_options", 24),
     ("vg_scene_options", 72),
 ];
@@ -888,7 +902,9 @@ init_of!(options_init, vg_options_init, "options", options(0));
 init_of!(report_figures_init, vg_report_figures_init, "figures", figures());
 init_of!(gaussian_arrays_init, vg_gaussian_arrays_init, "arrays", arrays(0, [0; 5], 0));
 init_of!(render_options_init, vg_render_options_init, "options", render_options(0));
-init_of!(image_target_init, vg_image_target_init, "target", target(0, 0, 0, 0));
+init_of!(image_target_init, vg_image_target_init, "target", target([(0, 0); 3]));
+init_of!(image_gradient_init, vg_image_gradient_init, "gradient", image_gradient([0; 3]));
+init_of!(gradients_init, vg_gradients_init, "gradients", gradients(0, 0, [0; 8]));
 init_of!(segment_options_init, vg_segment_options_init, "options", segment_options(0));
 init_of!(scene_options_init, vg_scene_options_init, "options", scene_options(0));
 
@@ -1051,6 +1067,8 @@ fn figures() -> Lent {
         calibration_lateral_m: elsewhere(),
         uncovered_before: elsewhere(),
         uncovered_after: elsewhere(),
+        refine_iterations: elsewhere(),
+        refine_kept: elsewhere(),
     });
     Lent::zeroed::<vg_report_figures>("vg_report_figures", fields)
 }
@@ -1198,6 +1216,9 @@ fn options(context: usize) -> Lent {
         max_views: [0, 1, 4097, 1 << 60, u64::MAX].map(|n| (n, Fine)).to_vec(),
         prior_model: elsewhere(),
         head_model: elsewhere(),
+        refine_seconds: refine_seconds(),
+        refine_iterations: vec![(0, Fine), (2, Fine), (1_000_001, Refused), (u64::from(u32::MAX), Refused)],
+        refine_hold_out: choice(&[0, 1]),
     });
     let mut lent = Lent::zeroed::<vg_options>("vg_options", fields);
     lent.put("context", 0, context as u64);
@@ -1251,7 +1272,8 @@ fn render_options(context: usize) -> Lent {
     lent
 }
 
-fn target(color: usize, color_stride: usize, depth: usize, depth_stride: usize) -> Lent {
+/// Colour, depth, alpha: address and stride.
+fn target(planes: [(usize, usize); 3]) -> Lent {
     let overflowing = [1, 47, usize::MAX as u64, usize::MAX as u64 / 2, (isize::MAX / 35) as u64];
     let fields = fields!(vg_image_target {
         struct_size: elsewhere(),
@@ -1263,17 +1285,22 @@ fn target(color: usize, color_stride: usize, depth: usize, depth_stride: usize) 
         depth_row_stride: counts(&overflowing),
         color_format: choice(&[]),
         flags: reserved(),
+        alpha: elsewhere(),
+        alpha_row_stride: counts(&overflowing),
     });
+    let [color, depth, alpha] = planes;
     let value = vg_image_target {
         struct_size: size_of::<vg_image_target>(),
         width: WIDTH,
         height: HEIGHT,
-        color: color as _,
-        color_row_stride: color_stride,
-        depth: depth as _,
-        depth_row_stride: depth_stride,
+        color: color.0 as _,
+        color_row_stride: color.1,
+        depth: depth.0 as _,
+        depth_row_stride: depth.1,
         color_format: vg_format::Rgba8 as i32,
         flags: 0,
+        alpha: alpha.0 as _,
+        alpha_row_stride: alpha.1,
     };
     Lent::new("vg_image_target", &[value], fields)
 }
@@ -1301,17 +1328,160 @@ pub fn render_through_a_lens(w: &World) -> Call {
 }
 
 fn render_as(w: &World, function: &'static str, camera: Lent) -> Call {
-    let width = WIDTH as usize;
-    let mut color = blank(HEIGHT, width * 4, width * 4 + 5, 1, false);
-    let mut depth = blank(HEIGHT, width * 4, width * 4 + 3, 2, true);
-    let lent = target(color.memory.pointer(), color.stride, depth.memory.pointer(), depth.stride);
+    let (lent, targets) = pictures();
     let mut call = Call::new(function, invoke!(vg_render 0 1 2 3))
         .argument("gaussians", Value::Handle(w.gaussians))
         .argument("camera", Value::Struct(camera))
         .argument("options", Value::Struct(render_options(w.context)))
         .nullable()
         .argument("target", Value::Struct(lent));
-    call.targets = vec![color, depth];
+    call.targets = targets;
+    call
+}
+
+/// Colour, depth and alpha with gaps between rows, at odd addresses.
+fn pictures() -> (Lent, Vec<Target>) {
+    let row = WIDTH as usize * 4;
+    let mut targets = vec![
+        blank(HEIGHT, row, row + 5, 1, false),
+        blank(HEIGHT, row, row + 3, 2, true),
+        blank(HEIGHT, row, row + 1, 3, true),
+    ];
+    let planes: Vec<_> = targets.iter_mut().map(|t| (t.memory.pointer(), t.stride)).collect();
+    (target([planes[0], planes[1], planes[2]]), targets)
+}
+
+/// Bytes from row to row of the planes of a gradient: colour without gaps, alpha and depth with some.
+pub const GRADIENT_STRIDES: [usize; 3] = [0, 4 * WIDTH as usize + 1, 4 * WIDTH as usize + 4];
+
+/// Gradients of colour, alpha and depth.
+fn image_gradient(planes: [usize; 3]) -> Lent {
+    let overflowing = [1, 47, 191, usize::MAX as u64, usize::MAX as u64 / 2, (isize::MAX / 35) as u64];
+    let fields = fields!(vg_image_gradient {
+        struct_size: elsewhere(),
+        width as "size": counts(&[0, 47, 49, 8193, u64::from(u32::MAX)]),
+        height as "size": counts(&[0, 35, 37, 8193, u64::from(u32::MAX)]),
+        color: elsewhere(),
+        color_row_stride: counts(&overflowing),
+        alpha: elsewhere(),
+        alpha_row_stride: counts(&overflowing),
+        depth: elsewhere(),
+        depth_row_stride: counts(&overflowing),
+        loss: elsewhere(),
+        loss_user: elsewhere(),
+        flags: vec![(0, Fine), (1, Refused), (1 << 63, Refused)],
+    });
+    let value = vg_image_gradient {
+        struct_size: size_of::<vg_image_gradient>(),
+        width: WIDTH,
+        height: HEIGHT,
+        color: planes[0] as _,
+        color_row_stride: GRADIENT_STRIDES[0],
+        alpha: planes[1] as _,
+        alpha_row_stride: GRADIENT_STRIDES[1],
+        depth: planes[2] as _,
+        depth_row_stride: GRADIENT_STRIDES[2],
+        loss: None,
+        loss_user: null_mut(),
+        flags: 0,
+    };
+    Lent::new("vg_image_gradient", &[value], fields)
+}
+
+/// Positions, scales, rotations, opacities, sh, background, pose, view matrix.
+fn gradients(count: usize, degree: i32, arrays: [usize; 8]) -> Lent {
+    let fields = fields!(vg_gradients {
+        struct_size: elsewhere(),
+        count: counts(&[0, 1, 1 << 31, 1 << 60, u64::MAX]),
+        positions: elsewhere(),
+        scales: elsewhere(),
+        rotations: elsewhere(),
+        opacities: elsewhere(),
+        sh: elsewhere(),
+        background: elsewhere(),
+        pose: elsewhere(),
+        view_matrix: elsewhere(),
+        sh_degree: counts(&[0, 1, 3, 4, 77, u64::from(u32::MAX)]),
+        flags: reserved(),
+    });
+    let value = vg_gradients {
+        struct_size: size_of::<vg_gradients>(),
+        count,
+        positions: arrays[0] as _,
+        scales: arrays[1] as _,
+        rotations: arrays[2] as _,
+        opacities: arrays[3] as _,
+        sh: arrays[4] as _,
+        background: arrays[5] as _,
+        pose: arrays[6] as _,
+        view_matrix: arrays[7] as _,
+        sh_degree: degree,
+        flags: 0,
+    };
+    Lent::new("vg_gradients", &[value], fields)
+}
+
+/// Numbers of both signs that repeat with no side of the picture.
+pub fn noise(n: usize) -> Vec<f32> {
+    (0..n).map(|i| ((i * 7919) % 1009) as f32 / 1009.0 - 0.5).collect()
+}
+
+/// Goes back without a picture.
+pub fn render_backward(w: &World) -> Call {
+    backward_as(w, w.camera(), false)
+}
+
+/// The other way through the renderer.
+pub fn render_backward_through_a_lens(w: &World) -> Call {
+    let mut straight = render_through_a_lens(w);
+    let camera = straight.lent("camera").clone();
+    backward_as(w, camera, false)
+}
+
+/// The picture comes along.
+pub fn render_backward_with_a_picture(w: &World) -> Call {
+    backward_as(w, w.camera(), true)
+}
+
+fn backward_as(w: &World, camera: Lent, has_picture: bool) -> Call {
+    let pixels = (WIDTH * HEIGHT) as usize;
+    let row = WIDTH as usize * 4;
+    let (color, plane) = (noise(3 * pixels), noise(pixels));
+    let mut memory = vec![
+        Memory::of(&color, 1),
+        Memory::new(&spread(bytes_of(&plane), row, GRADIENT_STRIDES[1], 0), 2),
+        Memory::new(&spread(bytes_of(&plane), row, GRADIENT_STRIDES[2], 0), 3),
+    ];
+    let planes: Vec<usize> = memory.iter_mut().map(Memory::pointer).collect();
+    let (n, degree) =
+        unsafe { (vg_gaussians_count(w.gaussians as _), vg_gaussians_sh_degree(w.gaussians as _)) };
+    let sh = 3 * (degree as usize + 1).pow(2);
+    // Each array is one row of a picture, at an address of its own.
+    let mut arrays: Vec<Target> = [12 * n, 12 * n, 16 * n, 4 * n, 4 * sh * n, 24, 48, 128]
+        .iter()
+        .enumerate()
+        .map(|(i, &bytes)| blank(1, bytes, bytes, i % 5, i < 5))
+        .collect();
+    let addresses: Vec<usize> = arrays.iter_mut().map(|array| array.memory.pointer()).collect();
+    let out = gradients(n, degree, addresses.try_into().expect("eight arrays"));
+    let (picture, targets) = pictures();
+    let target = if has_picture { Value::Struct(picture) } else { Value::Null };
+    let mut call = Call::new("vg_render_backward", invoke!(vg_render_backward 0 1 2 3 4 5))
+        .argument("gaussians", Value::Handle(w.gaussians))
+        .argument("camera", Value::Struct(camera))
+        .argument("options", Value::Struct(render_options(w.context)))
+        .nullable()
+        .argument("target", target)
+        .nullable()
+        .argument("gradient", Value::Struct(image_gradient([planes[0], planes[1], planes[2]])))
+        .argument("out", Value::Struct(out))
+        .memory(memory);
+    // What a gradient of colour on a transparent background is of.
+    call.lent("options").put("alpha", 0, vg_alpha::Premultiplied as u64);
+    call.targets = arrays;
+    if has_picture {
+        call.targets.extend(targets);
+    }
     call
 }
 

@@ -12,6 +12,7 @@ Quaternions are (w, x, y, z). Pictures are RGB, row 0 at the top.
 """
 
 from ._errors import Status, VgError
+from ._gradients import Gradients, Planes
 from ._native import (
     Camera,
     Gaussians,
@@ -29,7 +30,9 @@ from ._scene import Scene, open_scene
 __all__ = [
     "Camera",
     "Gaussians",
+    "Gradients",
     "Model",
+    "Planes",
     "Points",
     "Reconstruction",
     "Scene",

@@ -6,6 +6,8 @@ from typing import Literal, final, overload
 import numpy as np
 import numpy.typing as npt
 
+from ._gradients import Gradients, Planes
+
 __all__ = [
     "Camera",
     "Gaussians",
@@ -141,6 +143,33 @@ class Gaussians:
         far: float = 1e10,
         sh_degree: int = 3,
     ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]: ...
+    def render_planes(
+        self,
+        camera: Camera,
+        background: str | npt.ArrayLike = "white",
+        threads: int = 0,
+        *,
+        antialiased: bool = False,
+        near: float = 0.01,
+        far: float = 1e10,
+        sh_degree: int = 3,
+        depth_mode: str = "expected",
+    ) -> Planes: ...
+    def render_backward(
+        self,
+        camera: Camera,
+        color: npt.NDArray[np.float32] | None = None,
+        alpha: npt.NDArray[np.float32] | None = None,
+        depth: npt.NDArray[np.float32] | None = None,
+        background: str | npt.ArrayLike = "white",
+        threads: int = 0,
+        *,
+        antialiased: bool = False,
+        near: float = 0.01,
+        far: float = 1e10,
+        sh_degree: int = 3,
+        depth_mode: str = "expected",
+    ) -> Gradients: ...
     @property
     def means(self) -> npt.NDArray[np.float32]: ...
     @property
@@ -211,6 +240,9 @@ def reconstruct(
     budget: float | None,
     resolution: float,
     max_views: int | None,
+    refine_iterations: int | None,
+    refine_seconds: float | None,
+    refine_hold_out: bool,
     threads: int,
     names: Sequence[str] | None,
     progress: Callable[[str, float], object] | None,

@@ -60,6 +60,9 @@ def reconstruct(
     budget: float | None = None,
     resolution: float = 1.0,
     max_views: int | None = None,
+    refine_iterations: int | None = None,
+    refine_seconds: float | None = None,
+    refine_hold_out: bool = False,
     threads: int = 0,
     names: Iterable[str] | None = None,
     progress: Callable[[str, float], object] | None = None,
@@ -92,6 +95,9 @@ def reconstruct(
     resolution: the share of their width and height to which the views are resampled first, above 0, at most 1; a budget
     may choose less.
     max_views: use at most this many views, those that spread best around the vehicle; a budget may choose fewer.
+    refine_iterations, refine_seconds: optimise the model against the photographs, by so many steps, or by as many as fit
+    into about so many seconds; the report tells how many that were. Beside a budget, not within it.
+    refine_hold_out: one of three or more views takes no part in that and tells when to stop.
     threads: worker threads; 0 means one per core. The result is the same with any number.
     names: of the views, for messages and the report.
     progress: called as progress(stage, fraction) on this thread; a true return value cancels (a VgError with code
@@ -118,6 +124,9 @@ def reconstruct(
         budget=budget,
         resolution=resolution,
         max_views=max_views,
+        refine_iterations=refine_iterations,
+        refine_seconds=refine_seconds,
+        refine_hold_out=refine_hold_out,
         threads=threads,
         names=None if names is None else list(names),
         progress=progress,

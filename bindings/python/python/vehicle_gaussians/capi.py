@@ -34,6 +34,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._errors import Status, VgError
+from ._gradients import Gradients, Planes
 
 #: The binary interface that this module is written for.
 ABI_VERSION = 0
@@ -131,6 +132,8 @@ class DepthMode(enum.IntEnum):
 
 #: vg_progress_fn
 ProgressFn = ct.CFUNCTYPE(ct.c_int32, ct.c_char_p, ct.c_double, ct.c_void_p)
+#: vg_loss_fn
+LossFn = ct.CFUNCTYPE(ct.c_int32, ct.c_void_p)
 #: vg_log_fn
 LogFn = ct.CFUNCTYPE(None, ct.c_int32, ct.c_char_p, ct.c_void_p)
 
@@ -213,6 +216,9 @@ class vg_options(ct.Structure):
         ("max_views", ct.c_size_t),
         ("prior_model", ct.c_void_p),
         ("head_model", ct.c_void_p),
+        ("refine_seconds", ct.c_double),
+        ("refine_iterations", ct.c_uint32),
+        ("refine_hold_out", ct.c_int32),
     )
 
 
@@ -243,6 +249,8 @@ class vg_report_figures(ct.Structure):
         ("calibration_lateral_m", ct.c_double),
         ("uncovered_before", ct.c_double),
         ("uncovered_after", ct.c_double),
+        ("refine_iterations", ct.c_uint32),
+        ("refine_kept", ct.c_uint32),
     )
 
 
@@ -289,6 +297,42 @@ class vg_image_target(ct.Structure):
         ("depth", ct.c_void_p),
         ("depth_row_stride", ct.c_size_t),
         ("color_format", ct.c_int32),
+        ("flags", ct.c_uint32),
+        ("alpha", ct.c_void_p),
+        ("alpha_row_stride", ct.c_size_t),
+    )
+
+
+class vg_image_gradient(ct.Structure):
+    _fields_ = (
+        ("struct_size", ct.c_size_t),
+        ("width", ct.c_uint32),
+        ("height", ct.c_uint32),
+        ("color", ct.c_void_p),
+        ("color_row_stride", ct.c_size_t),
+        ("alpha", ct.c_void_p),
+        ("alpha_row_stride", ct.c_size_t),
+        ("depth", ct.c_void_p),
+        ("depth_row_stride", ct.c_size_t),
+        ("loss", LossFn),
+        ("loss_user", ct.c_void_p),
+        ("flags", ct.c_uint64),
+    )
+
+
+class vg_gradients(ct.Structure):
+    _fields_ = (
+        ("struct_size", ct.c_size_t),
+        ("count", ct.c_size_t),
+        ("positions", ct.c_void_p),
+        ("scales", ct.c_void_p),
+        ("rotations", ct.c_void_p),
+        ("opacities", ct.c_void_p),
+        ("sh", ct.c_void_p),
+        ("background", ct.c_void_p),
+        ("pose", ct.c_void_p),
+        ("view_matrix", ct.c_void_p),
+        ("sh_degree", ct.c_int32),
         ("flags", ct.c_uint32),
     )
 
@@ -381,6 +425,20 @@ PROTOTYPES: Mapping[str, tuple[Any, tuple[Any, ...]]] = {
     "vg_render": (
         _i32,
         (_handle, _pointer(vg_camera), _pointer(vg_render_options), _pointer(vg_image_target), _out),
+    ),
+    "vg_image_gradient_init": (_i32, (_pointer(vg_image_gradient), _size)),
+    "vg_gradients_init": (_i32, (_pointer(vg_gradients), _size)),
+    "vg_render_backward": (
+        _i32,
+        (
+            _handle,
+            _pointer(vg_camera),
+            _pointer(vg_render_options),
+            _pointer(vg_image_target),
+            _pointer(vg_image_gradient),
+            _pointer(vg_gradients),
+            _out,
+        ),
     ),
     "vg_segment_options_init": (_i32, (_pointer(vg_segment_options), _size)),
     "vg_segment": (
@@ -737,20 +795,9 @@ class Gaussians:
         context: Context | None,
         with_depth: bool,
     ) -> tuple[npt.NDArray[Any], npt.NDArray[np.float32] | None]:
-        posed = _camera(camera)
-        options, target = _initial(vg_render_options), _initial(vg_image_target)
-        options.context = None if context is None else context._as_parameter_
-        options.antialiased = antialiased
-        opaque = background != "transparent"
-        if opaque:
-            named: dict[Any, Sequence[float]] = {"white": (1, 1, 1), "black": (0, 0, 0)}
-            color = named.get(background, ()) if isinstance(background, str) else background
-            if len(color) != 3:
-                allowed = "white, black, transparent, or (r, g, b) from 0 to 1"
-                raise VgError(Status.ARGUMENT, f"background: {background!r}; allowed: {allowed}")
-            options.background_color[:] = color
-        else:
-            options.background = Background.TRANSPARENT
+        posed, target = _camera(camera), _initial(vg_image_target)
+        options = _render_options(background, antialiased, context)
+        opaque = options.background == Background.COLOR
         if dtype == np.uint8:
             target.color_format, channels = (Format.RGB8, 3) if opaque else (Format.RGBA8, 4)
         elif dtype == np.float32:
@@ -764,6 +811,74 @@ class Gaussians:
         target.color, target.depth = picture.ctypes.data, _address(depth)
         _call("vg_render", self._handle, ct.byref(posed), ct.byref(options), ct.byref(target))
         return (picture[..., :3] if opaque else picture), depth
+
+    def render_planes(
+        self,
+        camera: Camera,
+        background: str | Sequence[float] = "white",
+        *,
+        antialiased: bool = False,
+        depth_mode: Literal["expected", "accumulated"] = "expected",
+        context: Context | None = None,
+    ) -> Planes:
+        """The picture as losses look at it: colour over the background or premultiplied, alpha, and depth."""
+        posed, target = _camera(camera), _initial(vg_image_target)
+        options = _render_options(background, antialiased, context)
+        options.alpha, options.depth_mode = Alpha.PREMULTIPLIED, _choice(DepthMode, "depth_mode", depth_mode)
+        size = (posed.height, posed.width)
+        picture, alpha, depth = np.empty((*size, 4), np.float32), np.empty(size, np.float32), np.empty(size, np.float32)
+        target.width, target.height, target.color_format = posed.width, posed.height, Format.RGBA32F
+        target.color, target.alpha, target.depth = picture.ctypes.data, alpha.ctypes.data, depth.ctypes.data
+        _call("vg_render", self._handle, ct.byref(posed), ct.byref(options), ct.byref(target))
+        return Planes(np.ascontiguousarray(picture[..., :3]), alpha, depth)
+
+    def render_backward(
+        self,
+        camera: Camera,
+        color: npt.NDArray[np.float32] | None = None,
+        alpha: npt.NDArray[np.float32] | None = None,
+        depth: npt.NDArray[np.float32] | None = None,
+        background: str | Sequence[float] = "white",
+        *,
+        antialiased: bool = False,
+        depth_mode: Literal["expected", "accumulated"] = "expected",
+        context: Context | None = None,
+    ) -> Gradients:
+        """Gradients of everything a picture is made of, from those of a loss with respect to its planes; the arguments
+        are those of vehicle_gaussians.Gaussians.render_backward. Planes are read where they are."""
+        posed, gradient, out = _camera(camera), _initial(vg_image_gradient), _initial(vg_gradients)
+        options = _render_options(background, antialiased, context)
+        options.alpha, options.depth_mode = Alpha.PREMULTIPLIED, _choice(DepthMode, "depth_mode", depth_mode)
+        gradient.width, gradient.height = size = (posed.width, posed.height)
+        alive: list[Any] = []
+        for name, array, channels in (("color", color, (3,)), ("alpha", alpha, ()), ("depth", depth, ())):
+            if array is None:
+                continue
+            _expect(array, name, np.float32)
+            if array.shape != (*size[::-1], *channels):
+                raise VgError(Status.ARGUMENT, f"{name}: shape {array.shape}; allowed: {(*size[::-1], *channels)}")
+            lent = _lent(array, Format.DEPTH32F, alive)
+            setattr(gradient, name, lent.data)
+            setattr(gradient, name + "_row_stride", lent.row_stride)
+        n, coefficients = len(self), (self.sh_degree + 1) ** 2
+        made = Gradients(
+            np.empty((n, 3), np.float32),
+            np.empty((n, 3), np.float32),
+            np.empty((n, 4), np.float32),
+            np.empty(n, np.float32),
+            np.empty((n, coefficients, 3), np.float32),
+            np.empty(3),
+            np.empty(6),
+            np.empty((4, 4)),
+        )
+        fields = ("positions", "scales", "rotations", "opacities", "sh", "background", "pose", "view_matrix")
+        arrays: tuple[npt.NDArray[Any], ...] = made
+        for field, values in zip(fields, arrays, strict=True):
+            setattr(out, field, values.ctypes.data)
+        out.count, out.sh_degree = n, self.sh_degree
+        arguments = (ct.byref(posed), ct.byref(options), None, ct.byref(gradient), ct.byref(out))
+        _call("vg_render_backward", self._handle, *arguments)
+        return made
 
     def _array(self, name: str, *per_gaussian: int) -> npt.NDArray[np.float32]:
         address = getattr(library, "vg_gaussians_" + name)(self._handle)
@@ -806,6 +921,22 @@ class Gaussians:
         return f"Gaussians({len(self)}, sh_degree={self.sh_degree})"
 
 
+def _render_options(background: str | Sequence[float], antialiased: bool, context: Context | None) -> vg_render_options:
+    options: vg_render_options = _initial(vg_render_options)
+    options.context = None if context is None else context._as_parameter_
+    options.antialiased = antialiased
+    if isinstance(background, str) and background == "transparent":
+        options.background = Background.TRANSPARENT
+        return options
+    named: dict[Any, Sequence[float]] = {"white": (1, 1, 1), "black": (0, 0, 0)}
+    color = named.get(background, ()) if isinstance(background, str) else background
+    if len(color) != 3:
+        allowed = "white, black, transparent, or (r, g, b) from 0 to 1"
+        raise VgError(Status.ARGUMENT, f"background: {background!r}; allowed: {allowed}")
+    options.background_color[:] = color
+    return options
+
+
 class Points(NamedTuple):
     """The metric coloured point cloud."""
 
@@ -845,6 +976,9 @@ def reconstruct(
     budget: float | None = None,
     resolution: float = 1.0,
     max_views: int | None = None,
+    refine_iterations: int | None = None,
+    refine_seconds: float | None = None,
+    refine_hold_out: bool = False,
     names: Iterable[str] | None = None,
     progress: Callable[[str, float], object] | None = None,
     log: Callable[[LogLevel, str], object] | None = None,
@@ -896,6 +1030,17 @@ def reconstruct(
         if max_views < 1:
             raise VgError(Status.ARGUMENT, f"max_views: {max_views}; allowed: at least 1")
         options.max_views = max_views
+    if refine_iterations is not None:
+        # Of C, 0 is none.
+        if not 1 <= refine_iterations < 1 << 32:
+            allowed = "1 to 1000000"
+            raise VgError(Status.ARGUMENT, f"refine_iterations: {refine_iterations}; allowed: {allowed}")
+        options.refine_iterations = refine_iterations
+    if refine_seconds is not None:
+        if refine_seconds == 0:
+            raise VgError(Status.ARGUMENT, f"refine_seconds: {refine_seconds}; allowed: above 0, at most 86400")
+        options.refine_seconds = refine_seconds
+    options.refine_hold_out = refine_hold_out
     if cloud is not None:
         _expect(cloud, "cloud", np.float32)
         if cloud.ndim != 2 or cloud.shape[1] != 3:

@@ -188,7 +188,7 @@ static void colmap_without_a_folder(void) {
 
 /* In a build without networks that is the answer; with them, and no such file, another. */
 static void models_without_a_file(const vg_view *views, size_t count, vg_context *context) {
-    static uint8_t mask[64 * 48];
+    static uint8_t mask[1]; /* nothing is written without a model */
     vg_model_options settings;
     vg_segment_options segment;
     vg_options options;
@@ -203,7 +203,8 @@ static void models_without_a_file(const vg_view *views, size_t count, vg_context
     settings.threads = 2;
     built = vg_model_open("/nowhere/at/all.onnx", &settings, &model, NULL);
     CHECK(model == NULL && (built == VG_STATUS_NOT_BUILT || built == VG_STATUS_IO));
-    FAILS(vg_model_open("/nowhere/at/all.onnx", NULL, &model, &error), built, built == VG_STATUS_IO ? "all.onnx" : "onnx");
+    FAILS(vg_model_open("/nowhere/at/all.onnx", NULL, &model, &error), built,
+          built == VG_STATUS_IO ? "all.onnx" : "feature onnx");
     settings.provider = 9;
     FAILS(vg_model_open("x.onnx", &settings, &model, &error), VG_STATUS_ARGUMENT, "options.provider: 9");
     FAILS(vg_model_open(NULL, NULL, &model, &error), VG_STATUS_ARGUMENT, "path: NULL");
@@ -220,7 +221,8 @@ static void models_without_a_file(const vg_view *views, size_t count, vg_context
     segment.context = context;
     FAILS(vg_segment(NULL, &views[0].image, &views[0].camera, &segment, mask, 7, &error), VG_STATUS_ARGUMENT,
           "row_stride: 7 bytes");
-    FAILS(vg_segment(NULL, &views[0].image, &views[0].camera, &segment, NULL, 0, &error), VG_STATUS_ARGUMENT, "out_mask");
+    FAILS(vg_segment(NULL, &views[0].image, &views[0].camera, &segment, NULL, 0, &error), VG_STATUS_ARGUMENT,
+          "out_mask");
     FAILS(vg_segment(NULL, &views[0].image, &views[0].camera, NULL, mask, 0, &error),
           built == VG_STATUS_IO ? VG_STATUS_ARGUMENT : VG_STATUS_NOT_BUILT, "model");
     CHECK(mask[0] == 0);
@@ -270,6 +272,11 @@ static vg_gaussians *reconstruct(vg_context *context, const vg_view *views, size
     CHECK(options.calibrate == VG_CALIBRATE_AUTO && options.relight == VG_RELIGHT_AUTO && options.photo == 1);
     CHECK(options.budget_s == 0 && options.cloud == NULL && options.cloud_count == 0);
     CHECK(options.resolution == 1 && options.max_views == 0);
+    CHECK(options.refine_seconds == 0 && options.refine_iterations == 0 && options.refine_hold_out == 0);
+    options.refine_seconds = 1;
+    options.refine_iterations = 2;
+    FAILS(vg_reconstruct(views, count, &options, &again, NULL, &error), VG_STATUS_ARGUMENT, "options.refine_seconds: 1");
+    options.refine_seconds = 0;
     options.resolution = 1.5;
     FAILS(vg_reconstruct(views, count, &options, &again, NULL, &error), VG_STATUS_ARGUMENT, "options.resolution: 1.5");
     options.resolution = 1;
@@ -288,6 +295,7 @@ static vg_gaussians *reconstruct(vg_context *context, const vg_view *views, size
         DO(vg_report_get_figures(report, &figures, &error));
         CHECK(figures.prior == VG_PRIOR_SHAPE && figures.calibration == VG_CALIBRATION_NONE && figures.has_uncovered);
         CHECK(figures.uncovered_after <= figures.uncovered_before && figures.uncovered_before < 0.2);
+        CHECK(figures.refine_iterations == 2 && figures.refine_kept <= 2);
         CHECK(figures.relit_count == 0 && figures.photo_found == 0 && figures.cloud_used <= 1);
         vg_report_free(report);
         vg_gaussians_free(again);
@@ -430,6 +438,133 @@ static void render(const vg_gaussians *car, const vg_camera *photograph, vg_cont
     CHECK(vg_render(car, &camera, &options, &target, NULL) != VG_STATUS_OK);
 }
 
+enum { SIDE = 32 };
+
+/* What a loss needs: the picture, what it should be, and where to put the gradient. */
+typedef struct fit {
+    float picture[SIDE * SIDE * 4], wanted[SIDE * SIDE * 4], gradient[SIDE * SIDE * 3];
+    double loss;
+    int calls, answer;
+} fit;
+
+/* Half the sum of squared differences. */
+static int32_t squared(void *user) {
+    fit *f = (fit *)user;
+    int i, c;
+    f->loss = 0;
+    f->calls++;
+    for (i = 0; i < SIDE * SIDE; i++) {
+        for (c = 0; c < 3; c++) {
+            const float difference = f->picture[4 * i + c] - f->wanted[4 * i + c];
+            f->gradient[3 * i + c] = difference;
+            f->loss += 0.5 * difference * difference;
+        }
+    }
+    return f->answer;
+}
+
+/* Two Gaussians are fitted to a picture of others by steps down the gradient. */
+static void go_back(vg_context *context) {
+    static fit f;
+    static float plane[SIDE * SIDE];
+    float positions[6] = {-0.25f, 0, 2, 0.2f, 0.1f, 2.2f}, scales[6] = {0.2f, 0.3f, 0.2f, 0.3f, 0.2f, 0.2f};
+    float rotations[8] = {2, 0, 0, 0, 1, 1, 0, 0}, opacities[2] = {0.7f, 0.6f};
+    float sh[6] = {0.5f, -0.5f, 0, -0.2f, 0.9f, 0.3f};
+    float d_positions[8] = {0, 0, 0, 0, 0, 0, 77, 77}, d_scales[6], d_rotations[8], d_opacities[2], d_sh[6];
+    double background[3], pose[6], view_matrix[16], first = 0, along;
+    vg_camera camera;
+    vg_render_options options;
+    vg_image_target target;
+    vg_image_gradient gradient;
+    vg_gradients out;
+    vg_gaussian_arrays arrays;
+    vg_gaussians *wanted = NULL, *pair = NULL;
+    vg_error *error = NULL;
+    int i, step;
+
+    CHECK(vg_camera_init(&camera, sizeof camera) == VG_STATUS_OK);
+    camera.width = camera.height = SIDE;
+    camera.params[0] = camera.params[1] = SIDE;
+    camera.params[2] = camera.params[3] = SIDE / 2;
+    CHECK(vg_render_options_init(&options, sizeof options) == VG_STATUS_OK);
+    options.context = context;
+    CHECK(vg_image_target_init(&target, sizeof target) == VG_STATUS_OK);
+    CHECK(target.alpha == NULL && target.alpha_row_stride == 0);
+    target.width = target.height = SIDE;
+    target.color_format = VG_FORMAT_RGBA32F;
+    target.color = f.wanted;
+    CHECK(vg_gaussian_arrays_init(&arrays, sizeof arrays) == VG_STATUS_OK);
+    arrays.count = 2;
+    arrays.positions = positions;
+    arrays.scales = scales;
+    arrays.rotations = rotations;
+    arrays.opacities = opacities;
+    arrays.sh = sh;
+    DO(vg_gaussians_from_arrays(&arrays, &wanted, &error));
+    DO(vg_render(wanted, &camera, &options, &target, &error));
+    positions[0] += 0.1f;
+    positions[4] -= 0.1f;
+
+    CHECK(vg_image_gradient_init(&gradient, sizeof gradient) == VG_STATUS_OK);
+    CHECK(gradient.color == NULL && gradient.loss == NULL && gradient.loss_user == NULL);
+    gradient.width = gradient.height = SIDE;
+    gradient.color = f.gradient;
+    gradient.loss = squared;
+    gradient.loss_user = &f;
+    CHECK(vg_gradients_init(&out, sizeof out) == VG_STATUS_OK);
+    CHECK(out.count == 0 && out.positions == NULL && out.view_matrix == NULL);
+    out.count = 2;
+    out.positions = d_positions;
+    target.color = f.picture;
+    for (step = 0; step < 40; step++) {
+        DO(vg_gaussians_from_arrays(&arrays, &pair, &error));
+        DO(vg_render_backward(pair, &camera, &options, &target, &gradient, &out, &error));
+        CHECK(f.calls == step + 1 && d_positions[6] == 77 && d_positions[7] == 77);
+        first = step == 0 ? f.loss : first;
+        for (i = 0; i < 6; i++) {
+            positions[i] -= 2e-3f * d_positions[i];
+        }
+        vg_gaussians_free(pair);
+    }
+    CHECK(first > 0.1 && f.loss < first / 10);
+
+    /* Everything, of alpha, without a picture; what was given out before stays where it is not wanted. */
+    gradient.loss = NULL;
+    gradient.color = NULL;
+    gradient.alpha = plane;
+    for (i = 0; i < SIDE * SIDE; i++) {
+        plane[i] = i % SIDE < SIDE / 2 ? 1.0f : -1.0f;
+    }
+    out.positions = NULL;
+    out.scales = d_scales;
+    out.rotations = d_rotations;
+    out.opacities = d_opacities;
+    out.sh = d_sh;
+    out.background = background;
+    out.pose = pose;
+    out.view_matrix = view_matrix;
+    DO(vg_render_backward(wanted, &camera, &options, NULL, &gradient, &out, &error));
+    /* More of the left, less of the right: the left one should be more opaque, and the camera look to the left. */
+    CHECK(d_opacities[0] > 1 && d_opacities[1] < -1 && pose[3] > 1 && view_matrix[15] == 0);
+    for (i = 0; i < 6; i++) {
+        CHECK(d_sh[i] == 0 && isfinite(d_scales[i]) && isfinite(pose[i]));
+    }
+    along = d_rotations[4] + d_rotations[5]; /* perpendicular to the quaternion */
+    CHECK(near_to(along, 0, 1e-4) && background[0] == 0);
+
+    out.count = 3;
+    FAILS(vg_render_backward(wanted, &camera, &options, NULL, &gradient, &out, &error), VG_STATUS_ARGUMENT, "out.count: 3");
+    out.count = 2;
+    plane[SIDE + 3] = (float)NAN;
+    FAILS(vg_render_backward(wanted, &camera, &options, NULL, &gradient, &out, &error), VG_STATUS_ARGUMENT,
+          "gradient.alpha[1][3]: NaN");
+    gradient.loss = squared;
+    FAILS(vg_render_backward(wanted, &camera, &options, NULL, &gradient, &out, &error), VG_STATUS_ARGUMENT, "target: NULL");
+    f.answer = 1;
+    FAILS(vg_render_backward(wanted, &camera, &options, &target, &gradient, &out, &error), VG_STATUS_CANCELLED, "loss");
+    vg_gaussians_free(wanted);
+}
+
 int main(int argc, char **argv) {
     vg_context_options settings;
     vg_context *context = NULL;
@@ -471,6 +606,7 @@ int main(int argc, char **argv) {
     print_hash("sh", vg_gaussians_sh(car), n * 27 * sizeof(float));
     derive(car);
     render(car, &views[0].camera, context);
+    go_back(context);
 
     vg_scene_free(scene);
     vg_gaussians_free(car);

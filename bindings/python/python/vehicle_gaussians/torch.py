@@ -1,0 +1,232 @@
+"""Pictures that PyTorch can differentiate.
+
+>>> from vehicle_gaussians.torch import render
+>>> picture = render(means, rotations, scales, opacities, sh, camera)
+>>> (picture.color - photograph).square().mean().backward()
+
+Drawing is done by the library, on the processor, and so is the way back; PyTorch is needed by this module alone:
+``pip install torch``. Tensors are float32 on the CPU; others are refused and not moved, because a copy to and from a
+device in every step is better seen where it is made. Activations (exp for scales, sigmoid for opacities) are the
+caller's, in PyTorch.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ._errors import Status, VgError
+from ._native import Camera, Gaussians
+
+try:
+    import torch
+    from torch.autograd.function import once_differentiable
+except ImportError as error:
+    raise ImportError(
+        "vehicle_gaussians.torch needs PyTorch, which is not installed: pip install torch "
+        "(for the processor alone: pip install torch --index-url https://download.pytorch.org/whl/cpu)"
+    ) from error
+
+__all__ = ["Picture", "render"]
+
+
+class Picture(NamedTuple):
+    """What was drawn, as float32 tensors that can be differentiated."""
+
+    #: sRGB-encoded, over the background; premultiplied by alpha where that is transparent. (height, width, 3)
+    color: torch.Tensor
+    #: How much of the pixel the vehicle covers, 0 to 1, whatever the background. (height, width)
+    alpha: torch.Tensor
+    #: Metres along the optical axis, 0 where there is nothing. (height, width)
+    depth: torch.Tensor
+
+
+def render(
+    means: torch.Tensor,
+    rotations: torch.Tensor,
+    scales: torch.Tensor,
+    opacities: torch.Tensor,
+    sh: torch.Tensor,
+    camera: Camera,
+    *,
+    background: str | torch.Tensor = "white",
+    pose: torch.Tensor | None = None,
+    antialiased: bool = False,
+    near: float = 0.01,
+    far: float = 1e10,
+    sh_degree: int = 3,
+    depth_mode: Literal["expected", "accumulated"] = "expected",
+    threads: int = 0,
+) -> Picture:
+    """Draws Gaussians as a camera sees them; gradients go to every tensor that requires them.
+
+    Of n Gaussians: means (n, 3) and scales (n, 3), standard deviations, in metres; rotations (n, 4), quaternions
+    (w, x, y, z) of any norm but zero, which are normalised on the way and the gradient with them; opacities (n,) from
+    0 to 1; sh (n, (degree + 1)^2, 3).
+
+    background is "white", "black", "transparent" or a tensor (3,) of numbers from 0 to 1. pose is a tensor (6,): the
+    camera is turned about its own axes by the rotation vector pose[:3], radians, and moved by pose[3:] along the axes
+    it had, metres; zeros leave it where it is. The other arguments are those of Gaussians.render_planes.
+
+    Constants are the order of depth, the pixels a Gaussian reaches, what is too faint to be drawn, near and far.
+    There are no second derivatives.
+    """
+    count = means.shape[0] if isinstance(means, torch.Tensor) and means.ndim > 0 else -1
+    bands = sh.shape[1] if isinstance(sh, torch.Tensor) and sh.ndim == 3 else 16
+    if bands not in (1, 4, 9, 16):
+        raise VgError(Status.ARGUMENT, f"sh: shape {tuple(sh.shape)}; allowed: (n, K, 3) with K = 1, 4, 9 or 16")
+    shapes = {
+        "means": (means, (count, 3)),
+        "rotations": (rotations, (count, 4)),
+        "scales": (scales, (count, 3)),
+        "opacities": (opacities, (count,)),
+        "sh": (sh, (count, bands, 3)),
+    }
+    for name, (tensor, shape) in shapes.items():
+        _expect(tensor, name, shape)
+    if isinstance(background, torch.Tensor):
+        _expect(background, "background", (3,))
+    elif not isinstance(background, str):
+        raise TypeError(f"background: {type(background).__name__}; allowed: a name, or a tensor of shape (3,)")
+    if pose is not None:
+        _expect(pose, "pose", (6,))
+    if not isinstance(camera, Camera):
+        raise TypeError(f"camera: {type(camera).__name__}; allowed: a vehicle_gaussians.Camera")
+    settings = {
+        "antialiased": antialiased,
+        "near": near,
+        "far": far,
+        "sh_degree": sh_degree,
+        "depth_mode": depth_mode,
+        "threads": threads,
+    }
+    drawn = _Render.apply(means, rotations, scales, opacities, sh, background, pose, camera, settings)
+    return Picture(*drawn)
+
+
+class _Render(torch.autograd.Function):
+    @staticmethod
+    def forward(
+        ctx: Any,
+        means: torch.Tensor,
+        rotations: torch.Tensor,
+        scales: torch.Tensor,
+        opacities: torch.Tensor,
+        sh: torch.Tensor,
+        background: str | torch.Tensor,
+        pose: torch.Tensor | None,
+        camera: Camera,
+        settings: dict[str, Any],
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        # Saved by PyTorch, so that it notices what is changed in place, and frees them after the way back.
+        ctx.save_for_backward(
+            *(means, rotations, scales, opacities, sh),
+            background if isinstance(background, torch.Tensor) else None,
+            pose,
+        )
+        ctx.background, ctx.camera, ctx.settings = background, camera, settings
+        ctx.set_materialize_grads(False)
+        arrays = (means, rotations, scales, opacities, sh)
+        gaussians, placed, behind = _scene(arrays, camera, background, pose)
+        planes = gaussians.render_planes(placed, behind, **settings)
+        color, alpha, depth = (torch.from_numpy(plane) for plane in planes)
+        return color, alpha, depth
+
+    @staticmethod
+    @once_differentiable  # type: ignore[untyped-decorator, unused-ignore]
+    def backward(ctx: Any, *of_picture: torch.Tensor | None) -> tuple[torch.Tensor | None, ...]:
+        *arrays, tensor, pose = ctx.saved_tensors
+        nothing = (None,) * 9
+        if all(plane is None for plane in of_picture):
+            return nothing
+        background = ctx.background if tensor is None else tensor
+        gaussians, placed, behind = _scene(arrays, ctx.camera, background, pose)
+        color, alpha, depth = (None if plane is None else _numpy(plane) for plane in of_picture)
+        made = gaussians.render_backward(placed, color, alpha, depth, behind, **ctx.settings)
+        # The library's gradient is perpendicular to the unit quaternion q / |q|: what is left of the chain is 1 / |q|.
+        norms = np.linalg.norm(_numpy(arrays[1]).astype(np.float64), axis=1, keepdims=True)
+        rotations = made.quats / norms
+        values = (
+            made.means,
+            rotations,
+            made.scales,
+            made.opacities,
+            made.sh,
+            made.background,
+            None if pose is None else _of_pose(_numpy(pose), made.pose),
+        )
+        gradients = [
+            torch.from_numpy(np.ascontiguousarray(value, np.float32)) if needed and value is not None else None
+            for value, needed in zip(values, ctx.needs_input_grad, strict=False)
+        ]
+        return (*gradients, None, None)
+
+
+def _scene(
+    arrays: Any, camera: Camera, background: str | torch.Tensor, pose: torch.Tensor | None
+) -> tuple[Gaussians, Camera, str | npt.NDArray[np.float32]]:
+    means, rotations, scales, opacities, sh = (_numpy(array) for array in arrays)
+    gaussians = Gaussians.from_arrays(means, scales, rotations, opacities, sh)
+    placed = camera if pose is None else camera.with_pose(_moved(camera.vehicle_from_camera, _numpy(pose)))
+    return gaussians, placed, background if isinstance(background, str) else _numpy(background)
+
+
+def _numpy(tensor: torch.Tensor) -> npt.NDArray[np.float32]:
+    array: npt.NDArray[np.float32] = tensor.detach().contiguous().numpy()
+    return array
+
+
+def _moved(vehicle_from_camera: npt.NDArray[np.float64], pose: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
+    """The camera turned and moved along its own axes: R exp([w]), t + R v."""
+    moved = vehicle_from_camera.copy()
+    rotation = vehicle_from_camera[:3, :3]
+    w, v = pose[:3].astype(np.float64), pose[3:].astype(np.float64)
+    moved[:3, :3] = rotation @ _exp(w)
+    moved[:3, 3] += rotation @ v
+    return moved
+
+
+def _of_pose(pose: npt.NDArray[np.float32], at_camera: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """From the gradient of small motions of the camera where it was drawn to that of the motion that brought it there.
+
+    exp(w + dw) = exp(w) exp(J dw), J the right Jacobian; and dv is along the axes from before the turn.
+    """
+    w = pose[:3].astype(np.float64)
+    return np.concatenate([_right_jacobian(w).T @ at_camera[:3], _exp(w) @ at_camera[3:]])
+
+
+def _cross(w: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    return np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+
+
+def _exp(w: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    angle, k = float(np.linalg.norm(w)), _cross(w)
+    # np.sinc(x) is sin(pi x) / (pi x), and (1 - cos a) / a^2 = sinc(a / 2)^2 / 2 without the loss at 0.
+    sine, cosine = np.sinc(angle / np.pi), 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    turned: npt.NDArray[np.float64] = np.eye(3) + sine * k + cosine * (k @ k)
+    return turned
+
+
+def _right_jacobian(w: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    angle, k = float(np.linalg.norm(w)), _cross(w)
+    first = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    # (a - sin a) / a^3; below 1e-3 its series, whose next term is 1e-14.
+    second = 1 / 6 - angle**2 / 120 if angle < 1e-3 else (angle - np.sin(angle)) / angle**3
+    jacobian: npt.NDArray[np.float64] = np.eye(3) - first * k + second * (k @ k)
+    return jacobian
+
+
+def _expect(tensor: object, argument: str, shape: tuple[int, ...]) -> None:
+    if not isinstance(tensor, torch.Tensor):
+        raise TypeError(f"{argument}: {type(tensor).__name__}; allowed: a torch.Tensor of float32 on the CPU")
+    if tensor.dtype != torch.float32:
+        raise TypeError(f"{argument}: tensor of {tensor.dtype}; allowed: torch.float32, see .float()")
+    if tensor.device.type != "cpu":
+        raise TypeError(f"{argument}: tensor on {tensor.device}; allowed: on the CPU, see .cpu()")
+    if tensor.layout != torch.strided:
+        raise TypeError(f"{argument}: tensor of layout {tensor.layout}; allowed: torch.strided, see .to_dense()")
+    if tuple(tensor.shape) != shape:
+        wanted = str(shape).replace("-1", "n")
+        raise VgError(Status.ARGUMENT, f"{argument}: shape {tuple(tensor.shape)}; allowed: {wanted}")

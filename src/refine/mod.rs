@@ -1,0 +1,224 @@
+//! Per-scene optimisation: the Gaussians of one pass are moved until their pictures are the photographs.
+//!
+//! One step draws one view, takes the gradient of its error, and moves every parameter by Adam. Clones have no
+//! parameters of their own ([`tie`]): what a view of one side says, the other side follows. Photographs differ in
+//! exposure, which is solved for as well ([`exposure`]). One view takes no part and tells when to stop: pictures of the
+//! views that do take part always get better, the vehicle does not.
+
+mod adam;
+mod exposure;
+mod options;
+mod parameters;
+mod target;
+pub(crate) mod tie;
+mod work;
+
+pub use options::{Amount, RefineOptions};
+pub use parameters::Rates;
+
+use crate::error::Result;
+use crate::gaussians::Gaussians;
+use crate::progress::Context;
+use crate::scene::View;
+use exposure::Exposure;
+use parameters::Parameters;
+use serde::Serialize;
+use std::collections::VecDeque;
+use std::time::Instant;
+use tie::Clone as Tied;
+use work::Work;
+
+/// Why a refinement ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stop {
+    /// All steps are done.
+    Done,
+    /// The view that took no part got no better any more.
+    HeldOut,
+    /// The error grew far beyond where it began: the steps are too large.
+    Diverged,
+}
+
+/// What a refinement did.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Refinement {
+    /// Steps that were planned: with `Amount::Iterations` of this number another call does the same.
+    pub iterations: u32,
+    /// Steps that were made.
+    pub made: u32,
+    /// Steps that the result has seen; 0 if nothing was better than the beginning.
+    pub kept: u32,
+    /// Why it ended.
+    pub stop: Stop,
+    /// Loss of the first step, and the mean of the last round over the views.
+    pub loss: [f64; 2],
+    /// Mean PSNR of the views that took part, each in its exposure, before and after, dB.
+    pub psnr_db: [f64; 2],
+    /// The view that did not, where one was held out.
+    pub held_out: Option<HeldOut>,
+    /// Factors of the views' exposures, RGB, in the order of the views.
+    pub exposures: Vec<[f32; 3]>,
+}
+
+/// The view that took no part.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HeldOut {
+    /// Its name.
+    pub view: String,
+    /// Its PSNR before and after, dB.
+    pub psnr_db: [f64; 2],
+}
+
+/// Looks at the view that was held out, or at the mean loss, in the course of a refinement.
+const LOOKS: u32 = 20;
+/// So many looks in a row may be worse than the best.
+const PATIENCE: u32 = 4;
+/// A mean loss this many times the first never comes back.
+const DIVERGED: f64 = 3.0;
+/// Rounds over the views that tell how long a step takes, at the full step size.
+const TIMED_ROUNDS: u32 = 2;
+/// Step sizes at the end, as a share of those at the beginning.
+const LAST_RATE: f32 = 0.1;
+
+/// Moves the Gaussians until their pictures are those of the views. The last ones are `clones`, mirror images of those
+/// before; they follow. Views are pinholes in the frame whose plane of symmetry is y = 0.
+pub(crate) fn refine(
+    mut gaussians: Gaussians,
+    clones: &[Tied],
+    views: &[View],
+    options: &RefineOptions,
+    context: &Context,
+) -> Result<(Gaussians, Refinement)> {
+    let start = Instant::now();
+    gaussians.truncate(gaussians.len() - clones.len());
+    let mut work = Work::new(&gaussians, clones, views, options);
+    let beginning = State { parameters: Parameters::of(&gaussians), exposure: Exposure::new(views.len()) };
+    let mut state = beginning.clone();
+    drop(gaussians);
+    let held_out = (options.hold_out && views.len() >= 3).then_some(views.len() / 2);
+    let shown: Vec<usize> = (0..views.len()).filter(|v| Some(*v) != held_out).collect();
+    let round = shown.len() as u32;
+    let before = work.begin(&state, context)?;
+    let setup = start.elapsed();
+
+    let mut planned = match options.amount {
+        Amount::Iterations(n) => Some(n),
+        Amount::Seconds(_) => None,
+    };
+    let mut course = Course::default();
+    let mut best = Best { error: f64::INFINITY, step: 0, state: state.clone() };
+    if let Some(v) = held_out {
+        best.error = -before[v];
+    }
+    let (mut made, mut stop) = (0, Stop::Done);
+    let mut looks_in_vain = 0;
+    while planned.is_none_or(|n| made < n) {
+        let timed = TIMED_ROUNDS * round;
+        let rates = options.rates.times(decay(made, timed, planned));
+        let view = shown[(made % round) as usize];
+        course.push(work.step(view, &mut state, &rates, context)?, round);
+        made += 1;
+        if let (None, Amount::Seconds(seconds)) = (planned, options.amount)
+            && made == timed
+        {
+            let step = (start.elapsed() - setup).as_secs_f64() / f64::from(made);
+            planned = Some(fitting(seconds, setup.as_secs_f64(), step).max(made));
+        }
+        let Some(planned) = planned else { continue };
+        context.report("refine", f64::from(made) / f64::from(planned))?;
+        let every = (planned / LOOKS).max(round);
+        if made % every != 0 && made != planned {
+            continue;
+        }
+        let error = match held_out {
+            Some(v) => -work.psnr_of(v, &state, context)?,
+            None => course.last,
+        };
+        if error < best.error {
+            best = Best { error, step: made, state: state.clone() };
+            looks_in_vain = 0;
+        } else {
+            looks_in_vain += 1;
+        }
+        if course.has_diverged() {
+            stop = Stop::Diverged;
+            break;
+        }
+        if held_out.is_some() && looks_in_vain >= PATIENCE && made < planned {
+            stop = Stop::HeldOut;
+            break;
+        }
+    }
+    let after = work.psnr_db(&best.state, context)?;
+    // What is judged by its own loss alone may have begun better than it ever was later.
+    let shown_mean = |psnr: &[f64]| shown.iter().map(|&v| psnr[v]).sum::<f64>() / f64::from(round);
+    let (best, after) = match held_out.is_none() && shown_mean(&after) < shown_mean(&before) {
+        true => (Best { error: 0.0, step: 0, state: beginning }, before.clone()),
+        false => (best, after),
+    };
+    let report = Refinement {
+        iterations: planned.unwrap_or(made),
+        made,
+        kept: best.step,
+        stop,
+        loss: [course.first.unwrap_or_default(), course.last],
+        psnr_db: [shown_mean(&before), shown_mean(&after)],
+        held_out: held_out.map(|v| HeldOut { view: views[v].name.clone(), psnr_db: [before[v], after[v]] }),
+        exposures: (0..views.len()).map(|v| best.state.exposure.factor(v)).collect(),
+    };
+    Ok((work.finished(&best.state, context), report))
+}
+
+/// Share of the step size at a step: the full one while steps are timed, then it falls exponentially, as in 3DGS.
+fn decay(step: u32, timed: u32, planned: Option<u32>) -> f32 {
+    match planned {
+        Some(planned) if step > timed => {
+            LAST_RATE.powf((step - timed) as f32 / planned.saturating_sub(timed).max(1) as f32)
+        }
+        _ => 1.0,
+    }
+}
+
+/// Steps of `step` seconds that fit into `seconds`, of which setting up took `setup`, and a last look takes about as
+/// much.
+fn fitting(seconds: f64, setup: f64, step: f64) -> u32 {
+    ((seconds - 2.0 * setup) / step) as u32
+}
+
+/// Everything that steps change.
+#[derive(Clone, Debug)]
+struct State {
+    parameters: Parameters,
+    exposure: Exposure,
+}
+
+/// The state that was best, and after which step.
+struct Best {
+    error: f64,
+    step: u32,
+    state: State,
+}
+
+/// The first loss, and the mean of the last round.
+#[derive(Debug, Default)]
+struct Course {
+    recent: VecDeque<f64>,
+    first: Option<f64>,
+    last: f64,
+}
+
+impl Course {
+    fn push(&mut self, loss: f64, round: u32) {
+        self.first.get_or_insert(loss);
+        self.recent.push_back(loss);
+        if self.recent.len() > round as usize {
+            self.recent.pop_front();
+        }
+        self.last = self.recent.iter().sum::<f64>() / self.recent.len() as f64;
+    }
+
+    fn has_diverged(&self) -> bool {
+        self.first.is_some_and(|first| self.last > DIVERGED * first)
+    }
+}
