@@ -14,6 +14,8 @@ pub struct Progress {
     pub stage: &'static str,
     /// Part of the stage that is done, 0 to 1.
     pub fraction: f64,
+    /// What an optimisation has come down to, where the stage is one.
+    pub loss: Option<f64>,
 }
 
 /// Called on the caller's own thread at every stage boundary and inside the long ones; `Break` cancels.
@@ -148,7 +150,17 @@ impl<'a> Context<'a> {
 
     /// Tells the caller where the run stands; an error if the caller wants it to stop.
     pub fn report(&self, stage: &'static str, fraction: f64) -> Result<()> {
-        match (*self.callback.borrow_mut())(Progress { stage, fraction }) {
+        self.tell(Progress { stage, fraction, loss: None })
+    }
+
+    /// The same of an optimisation.
+    pub fn report_loss(&self, stage: &'static str, fraction: f64, loss: f64) -> Result<()> {
+        self.tell(Progress { stage, fraction, loss: Some(loss) })
+    }
+
+    fn tell(&self, progress: Progress) -> Result<()> {
+        let stage = progress.stage;
+        match (*self.callback.borrow_mut())(progress) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Error::Cancelled { stage }),
         }

@@ -169,10 +169,10 @@ fn what_cannot_be_is_refused_by_its_name() {
 #[test]
 fn a_caller_can_stop_it() {
     let scene = right_side(48, 36);
-    let mut seen = 0;
+    let mut losses = Vec::new();
     let stopped = reconstruct(&scene, &options(steps(1000)), &mut |progress| {
-        seen += usize::from(progress.stage == "refine");
-        if seen > 3 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        losses.extend(progress.loss);
+        if losses.len() > 3 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     assert!(matches!(stopped, Err(Error::Cancelled { stage: "refine" })));
 }

@@ -126,7 +126,7 @@ pub(crate) fn refine(
             planned = Some(fitting(seconds, setup.as_secs_f64(), step).max(made));
         }
         let Some(planned) = planned else { continue };
-        context.report("refine", f64::from(made) / f64::from(planned))?;
+        context.report_loss("refine", f64::from(made) / f64::from(planned), course.last)?;
         let every = (planned / LOOKS).max(round);
         if made % every != 0 && made != planned {
             continue;

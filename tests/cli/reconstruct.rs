@@ -106,3 +106,30 @@ fn depth_scale_replaces_the_scenes_unit() {
     let run = vg_in(at, "reconstruct . --views 001 --prior given --depth-scale 1 -o {}/c.ply");
     assert!(run.err.contains("is the unit right?"), "{run:?}");
 }
+
+#[test]
+fn a_refinement_is_reported_and_bad_amounts_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = vg_in(
+        folder.path(),
+        &format!(
+            "reconstruct . --views {INPUTS} --resolution 0.25 --refine 8 -o {{}}/a.ply --report {{}}/r.json"
+        ),
+    );
+    assert_eq!(made.code, 0, "{}", made.err);
+    let report: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("r.json")).unwrap()).unwrap();
+    let done = &report["refinement"];
+    assert_eq!((done["iterations"].as_u64(), done["stop"].as_str()), (Some(8), Some("done")));
+    assert!(done["psnr_db"][1].as_f64() > done["psnr_db"][0].as_f64(), "{done}");
+    for (amount, expected) in [
+        ("many", "expected a number of steps (300) or of seconds (5s)"),
+        ("0s", "expected above 0, at most 86400"),
+        ("-5", "expected a number of steps"),
+        ("2000000", "expected at most 1000000"),
+        ("infs", "expected above 0"),
+    ] {
+        let refused = vg_in(folder.path(), &format!("reconstruct . --refine={amount} -o {{}}/b.ply"));
+        assert!(refused.code == 2 && refused.err.contains(expected), "{amount}: {}", refused.err);
+    }
+}

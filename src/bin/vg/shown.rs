@@ -9,7 +9,8 @@ use vg::progress::Progress;
 const STEPS: u64 = 100;
 
 /// The stages in order, as a reconstruction reports them.
-const STAGES: [&str; 8] = ["plan", "undistort", "calibrate", "prior", "pixels", "head", "symmetry", "check"];
+const STAGES: [&str; 9] =
+    ["plan", "undistort", "calibrate", "prior", "pixels", "head", "symmetry", "refine", "check"];
 
 /// A bar on standard error, where that is a terminal; else nothing.
 pub(crate) struct Bar(ProgressBar);
@@ -36,7 +37,10 @@ impl Bar {
 
     /// Where a reconstruction stands.
     pub(crate) fn show(&self, progress: Progress) -> ControlFlow<()> {
-        self.0.set_message(progress.stage);
+        match progress.loss {
+            Some(loss) => self.0.set_message(format!("{}, loss {loss:.5}", progress.stage)),
+            None => self.0.set_message(progress.stage),
+        }
         if let Some(stage) = STAGES.iter().position(|s| *s == progress.stage) {
             self.0.set_position(stage as u64 * STEPS + (progress.fraction * STEPS as f64) as u64);
         }
