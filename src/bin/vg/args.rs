@@ -92,6 +92,9 @@ pub(crate) struct MethodArgs {
     /// Optimise the model against the photographs: so many steps (300), or as many as fit into so many seconds (5s)
     #[arg(long, value_name = "N|SECONDSs", value_parser = refinement)]
     refine: Option<Amount>,
+    /// Keep one of three or more views out of the optimisation, to tell when to stop
+    #[arg(long, requires = "refine")]
+    refine_hold_out: bool,
     /// Do not move the shape prior's surface to where the photographs agree
     #[arg(long)]
     no_photo: bool,
@@ -170,7 +173,11 @@ impl MethodArgs {
             max_views: self.max_views,
             threads: self.threads,
             points: false,
-            refine: self.refine.map(|amount| RefineOptions { amount, ..RefineOptions::default() }),
+            refine: self.refine.map(|amount| RefineOptions {
+                amount,
+                hold_out: self.refine_hold_out,
+                ..RefineOptions::default()
+            }),
         }
     }
 }
