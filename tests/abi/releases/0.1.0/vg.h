@@ -43,6 +43,9 @@
  *            premultiplied; opaque ones have alpha 1. 8-bit values are rounded and clamped; RGBA32F is not clamped
  *            above 1.
  *
+ * Gradients. Of one scalar, a loss, with respect to the number as the library holds it: float32 for pictures and
+ *            Gaussians, laid out as they are, double for camera and background. vg_render_backward.
+ *
  * Ownership. Whoever receives a handle through an out parameter frees it with the matching _free function, which
  *            accepts NULL. Pointers that a function returns are borrowed: they live as long as the handle they were
  *            asked of. transform, mirror and merge return new handles. No struct owns what it points to.
@@ -62,7 +65,7 @@
  *
  * Errors.    Functions that can fail return a vg_status and, through out_error, an object with a message: which
  *            argument, what was found, what is allowed. On failure, out handles are NULL, and everything the caller
- *            owns is as it was. out_error may be NULL. A bug in the library is a status too; it neither aborts nor
+ *            owns is as it was, but for a picture that a vg_loss_fn was shown. out_error may be NULL. A bug in the library is a status too; it neither aborts nor
  *            throws. Running out of memory aborts, as it does in most programs.
  *
  * Same bytes. The same input and the same options give the same bytes, with any number of threads, on the same
