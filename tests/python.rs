@@ -1,7 +1,7 @@
 //! The Python package, installed from the checkout into an environment of its own below `target`: its tests, and the
 //! bytes it gets beside those of Rust.
 //!
-//! What this machine lacks is skipped with a printed reason; `VG_NO_SKIP=1` makes it a failure.
+//! What this machine lacks is skipped with a printed reason; `VG_NO_SKIP=1` makes it a failure, but for PyTorch.
 
 #[path = "common/mod.rs"]
 mod common;
@@ -62,7 +62,9 @@ fn the_python_package_passes_its_tests() {
     let printed = tools::run(&mut pytest);
     assert!(printed.contains(" passed"), "{printed}");
     for line in printed.lines().filter(|line| line.starts_with("SKIPPED")) {
-        assert!(std::env::var_os("VG_NO_SKIP").is_none(), "{line}");
+        // Gigabytes that nothing else needs: not among the packages of the tests.
+        let may_lack = line.ends_with("PyTorch is not installed");
+        assert!(may_lack || std::env::var_os("VG_NO_SKIP").is_none(), "{line}");
         tools::say(&format!("skipped: {line}"));
     }
 }
