@@ -497,8 +497,8 @@ mod tests {
         all.append_mirrored();
         let mirrored = all.clone();
         let n = seen.len();
-        let done = light.apply(&mut all, n..2 * n);
-        assert_eq!(done.clones, n);
+        let (done, gains) = light.apply(&mut all, n..2 * n);
+        assert_eq!((done.clones, gains.len()), (n, n));
         assert!(done.left_over_right < 0.7 && done.sun[1] < -0.2, "{done:?}");
         assert_eq!((all.means(), all.scales()), (mirrored.means(), mirrored.scales()));
         assert_eq!((all.rotations(), all.opacities()), (mirrored.rotations(), mirrored.opacities()));
