@@ -2,6 +2,7 @@
 #![allow(dead_code, unreachable_pub)] // each program uses a part, through a module of its own
 
 pub mod golden;
+pub mod gradients;
 pub mod npz;
 pub mod sample;
 pub mod scenes;

@@ -1,0 +1,146 @@
+//! Stiff refinements: each stays finite, and says when it stopped and why.
+
+use crate::common::vehicle::{camera, right_side, view};
+use std::ops::ControlFlow;
+use std::sync::OnceLock;
+use std::time::Instant;
+use vg::pipeline::{Calibrate, Keep, Options, PriorChoice, reconstruct};
+use vg::refine::{Amount, Rates, RefineOptions, Refinement, Stop};
+use vg::relight::Relight;
+use vg::scene::mask::Label;
+use vg::scene::{DepthMap, Mask, RgbImage};
+use vg::symmetry::SymmetryMode;
+use vg::{Gaussians, Scene};
+
+/// Steps that are planned.
+const STEPS: u32 = 40;
+
+/// A refinement that no one should ask for.
+pub struct Stiff {
+    pub condition: &'static str,
+    scene: Scene,
+    rates: Rates,
+    keep: Keep,
+    /// Why it ends.
+    pub stop: Stop,
+}
+
+/// What became of it.
+pub struct Outcome {
+    pub gaussians: Gaussians,
+    pub refinement: Refinement,
+    pub ms: f64,
+}
+
+fn times(factor: f32) -> Rates {
+    let RefineOptions { rates, .. } = RefineOptions::default();
+    Rates {
+        means: factor * rates.means,
+        rotations: factor * rates.rotations,
+        scales: factor * rates.scales,
+        opacities: factor * rates.opacities,
+        colors: factor * rates.colors,
+        view_dependence: factor * rates.view_dependence,
+        exposure: factor * rates.exposure,
+    }
+}
+
+/// A photograph from the middle of the vehicle, all of it vehicle, at 1 m.
+fn from_inside(mut scene: Scene) -> Scene {
+    let mut inside = camera(-90.0, 6.5, 48, 36);
+    inside.vehicle_from_camera.translation *= 0.01;
+    let mut view = view("inside", inside);
+    let pixels = 48 * 36;
+    view.image = RgbImage::new(48, 36, vec![[120, 60, 200]; pixels]).unwrap();
+    view.mask = Some(Mask::new(48, 36, vec![Label::Vehicle; pixels]).unwrap());
+    view.depth = Some(DepthMap::new(48, 36, vec![1.0; pixels]).unwrap());
+    scene.views.push(view);
+    scene
+}
+
+pub fn all() -> Vec<Stiff> {
+    let scene = || right_side(48, 36);
+    let stiff = |condition: &'static str, rates: Rates| Stiff {
+        condition,
+        scene: scene(),
+        rates,
+        keep: Keep::default(),
+        stop: Stop::Done,
+    };
+    let usual = RefineOptions::default().rates;
+    let mut twice = scene();
+    twice.views.extend(scene().views);
+    vec![
+        stiff("all rates 100 times the default", times(100.0)),
+        Stiff { stop: Stop::Diverged, ..stiff("all rates 400 times the default", times(400.0)) },
+        Stiff {
+            stop: Stop::Diverged,
+            ..stiff("scales thrown to their bounds, 1e-7 m and 3 m: rate 10", Rates { scales: 10.0, ..usual })
+        },
+        Stiff {
+            stop: Stop::Diverged,
+            ..stiff("opacities thrown to 6e-6 and 1 - 6e-6: rate 10", Rates { opacities: 10.0, ..usual })
+        },
+        Stiff {
+            scene: twice,
+            keep: Keep { duplicate_views: true, overlap: true, ..Keep::default() },
+            ..stiff("coplanar duplicates: every view twice", usual)
+        },
+        Stiff { scene: from_inside(scene()), ..stiff("a camera inside the vehicle", usual) },
+    ]
+}
+
+/// Of every case, run once.
+pub fn outcomes() -> &'static [Outcome] {
+    static OUTCOMES: OnceLock<Vec<Outcome>> = OnceLock::new();
+    OUTCOMES.get_or_init(|| all().iter().map(Stiff::run).collect())
+}
+
+impl Stiff {
+    fn run(&self) -> Outcome {
+        let refine = RefineOptions {
+            amount: Amount::Iterations(STEPS),
+            rates: self.rates,
+            ..RefineOptions::default()
+        };
+        let options = Options {
+            prior: PriorChoice::Given,
+            symmetry: SymmetryMode::Always,
+            relight: Relight::Never,
+            calibrate: Calibrate::Off,
+            refine: Some(refine),
+            keep: self.keep,
+            threads: 2,
+            ..Options::default()
+        };
+        let begin = Instant::now();
+        let made = reconstruct(&self.scene, &options, &mut |_| ControlFlow::Continue(())).unwrap();
+        let ms = begin.elapsed().as_secs_f64() * 1e3;
+        Outcome { gaussians: made.gaussians, refinement: made.report.refinement.unwrap(), ms }
+    }
+}
+
+#[test]
+fn stiff_refinements_stay_finite_and_say_why_they_stopped() {
+    for (stiff, Outcome { gaussians: g, refinement: done, .. }) in all().iter().zip(outcomes()) {
+        println!("{:60} {done:?}", stiff.condition);
+        let arrays = [
+            g.means().as_flattened(),
+            g.rotations().as_flattened(),
+            g.scales().as_flattened(),
+            g.opacities(),
+            g.sh(),
+        ];
+        assert!(arrays.iter().all(|a| a.iter().all(|v| v.is_finite())), "{}", stiff.condition);
+        assert!(
+            done.loss.iter().chain(&done.psnr_db).all(|v| v.is_finite()),
+            "{}: {done:?}",
+            stiff.condition
+        );
+        assert_eq!(done.stop, stiff.stop, "{}", stiff.condition);
+        // Divergence is seen at a look, of which there are 20 or one a round.
+        assert!(done.made == STEPS || done.stop == Stop::Diverged && done.made < STEPS, "{done:?}");
+        // What got no better is given back as it was.
+        assert!(done.psnr_db[1] >= done.psnr_db[0], "{}: {done:?}", stiff.condition);
+    }
+}
