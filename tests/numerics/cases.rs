@@ -72,8 +72,11 @@ pub fn forward(width: u32, height: u32, focal: f64) -> Camera {
     Camera::pinhole(width, height, intrinsics, Pose { rotation, translation: DVec3::ZERO }).unwrap()
 }
 
+/// Mean, rotation, scale, opacity.
+type Shape = ([f32; 3], [f32; 4], [f32; 3], f32);
+
 /// Grey Gaussians of degree 0.
-pub fn grey(each: &[([f32; 3], [f32; 4], [f32; 3], f32)]) -> Gaussians {
+pub fn grey(each: &[Shape]) -> Gaussians {
     let sh = each.iter().enumerate().flat_map(|(i, _)| [0.3, 0.1 * (i % 5) as f32, -0.3]).collect();
     Gaussians::from_arrays(
         0,
