@@ -5,7 +5,7 @@ mod common;
 use common::Random;
 use common::golden::{camera, gaussians, golden};
 use common::gradients::{all_finite, difference, f64s, largest, largest_of, noise};
-use common::gradients::{of_variable, sampled, tensors};
+use common::gradients::{loss_between, of_variable, sampled, tensors};
 use common::npz::Npz;
 use common::scenes::{looking_at_origin, random};
 use common::stiff::{Stiff, stiff};

@@ -88,8 +88,8 @@ fn every_sh_degree_cap_and_option_agrees_with_the_reference() {
     for options in variants {
         let found = CpuRenderer::new().render(&gaussians, &camera, &options).unwrap();
         let exact = Reference.render(&gaussians, &camera, &options).unwrap();
-        // Expected depth of an alpha of 1/255 carries 1/255's rounding: 1.5e-5 of 6 m.
-        assert_close(&format!("{options:?}")[..40], &found, &exact, 1e-5, 1e-3);
+        // Expected depth is a mean of depths, whatever is rounded.
+        assert_close(&format!("{options:?}")[..40], &found, &exact, 1e-5, 5e-5);
     }
 }
 

@@ -34,8 +34,8 @@ pub struct Case {
 pub const RESOLUTION: f64 = 2e-9;
 /// f32 sums of tens of layers.
 pub const PICTURE: f64 = 5e-6;
-/// Expected depth is divided by 1 - T, whose rounding is 1.5e-5 of an alpha of 1/255.
-pub const DEPTH: f64 = 3e-5;
+/// The mean of depths by weights that sum up to what they are divided by: f32 sums of tens of layers, again.
+pub const DEPTH: f64 = 3e-6;
 /// f32 sums over hundreds of pixels. Expected depth has the last word: its f32 step (5e-7 m at 5 m) over an alpha of 1/255.
 pub const GRADIENT: f64 = 1e-4;
 /// Central differences of fourth order in f64, over sums that cancel.
@@ -72,8 +72,11 @@ pub fn forward(width: u32, height: u32, focal: f64) -> Camera {
     Camera::pinhole(width, height, intrinsics, Pose { rotation, translation: DVec3::ZERO }).unwrap()
 }
 
+/// Mean, rotation, scale, opacity.
+type Shape = ([f32; 3], [f32; 4], [f32; 3], f32);
+
 /// Grey Gaussians of degree 0.
-pub fn grey(each: &[([f32; 3], [f32; 4], [f32; 3], f32)]) -> Gaussians {
+pub fn grey(each: &[Shape]) -> Gaussians {
     let sh = each.iter().enumerate().flat_map(|(i, _)| [0.3, 0.1 * (i % 5) as f32, -0.3]).collect();
     Gaussians::from_arrays(
         0,
@@ -314,7 +317,7 @@ fn crowds() -> Vec<Case> {
         Case {
             // T is a product of up to 1800 rounded factors: 1800 * 6e-8, and as many colours are added.
             picture: 1e-4,
-            depth: 1e-4,
+            depth: 1e-5,
             gradient: 1e-3,
             ..case(
                 "1e5 of opacity 0.005 behind one another",

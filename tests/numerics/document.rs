@@ -33,17 +33,18 @@ const SCENES: &str = "\
 `CpuRenderer` (f32) against the reference (f64): largest error / root mean square. Colour is in units of the picture's largest
 colour (at least 1), depth of itself (expected depth). Gradients are of a loss that is noise on all planes: the largest error of
 any entry, in units of the largest in its tensor, and which tensor that is; then the f64 gradients against central differences
-of the f64 picture with its cuts held, 14 variables. Times are of one picture with its gradients in the unoptimised test
-build: they tell which case is slow, `RENDERER.md` tells how fast the renderer is.
+of the f64 picture with its cuts held, 14 variables. Times are of one picture with its gradients in the test build, all tests
+running beside: they tell which case is slow, `RENDERER.md` tells how fast the renderer is.
 
 ";
 
 const LIMITS: &str = "\n\
-Limits of the tests: colour and alpha 5e-6 (f32 sums of tens of layers), depth 3e-5 of itself (weights are f32 beside a T of
-about 1), gradients 1e-4 (f32 sums over hundreds of pixels; expected depth divides depth's f32 step, 5e-7 m at 5 m, by an alpha
-of down to 1/255), central differences 1e-5 (fourth order in f64) of tensors that are large enough for them. The veil's gradients may be
-off by 1e-3 for the same reason, and those of the stack of 1e5, whose T is a product of up to 1,800 rounded factors (picture 1e-4). From 1e6 m the vehicle is 70 steps
-of f32 deep, and gradients of a loss on expected depth mean little: place such a camera nearer, or ask for no depth.
+Limits of the tests: colour and alpha 5e-6, depth 3e-6 of itself (f32 sums of tens of layers), gradients 1e-4 (f32 sums over
+hundreds of pixels; expected depth divides depth's f32 step, 5e-7 m at 5 m, by an alpha of down to 1/255), central differences
+1e-5 (fourth order in f64) of tensors that are large enough for them. The veil's gradients may be off by 1e-3: the f32 step at
+8 m is 1e-6 m, 2e-4 of its alpha. So may those of the stack of 1e5 (its picture 1e-4, its depth 1e-5): T is a product of up to
+1,800 rounded factors there. From 1e6 m the vehicle is 70 steps of f32 deep, and gradients of a loss on expected depth mean
+little: place such a camera nearer, or ask for no depth.
 
 ";
 

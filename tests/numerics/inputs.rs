@@ -421,7 +421,7 @@ fn summed_up(made: &Reconstruction) -> Result<String> {
         .map(|l| format!("{} {}: {}", l.count, l.what, l.why))
         .collect();
     let left = if left.is_empty() { String::new() } else { format!("; left out {}", left.join(", ")) };
-    Ok(format!("finite Gaussians from {} views{left}", report.views_used.len()))
+    Ok(format!("finite Gaussians, views used: {}{left}", report.views_used.len()))
 }
 
 fn masked(label: fn(usize) -> Label) -> Result<String> {

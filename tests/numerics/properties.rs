@@ -24,19 +24,19 @@ pub struct Property {
 
 pub const AGREES: Property = Property {
     claim: "the f32 picture is the f64 picture",
-    tolerance: Some(2e-5),
+    tolerance: Some(2e-6),
     why: "f32 sums of up to 24 layers, centres to 2^-25 px",
 };
 pub const TWICE: Property =
     Property { claim: "mirrored twice is what it was", tolerance: None, why: "only signs change" };
 pub const FLIPPED: Property = Property {
     claim: "the mirrored scene from the mirrored camera is the flipped picture",
-    tolerance: Some(2e-5),
+    tolerance: Some(2e-6),
     why: "u and width - u round apart",
 };
 pub const MOVED: Property = Property {
     claim: "scene and camera moved together show the same",
-    tolerance: Some(2e-3),
+    tolerance: Some(1e-4),
     why: "means stored in f32 move by up to 1e-6 m at 16 m, quaternions by 6e-8: 1e-4 px on needles of 2 m",
 };
 pub const PERMUTED: Property = Property {

@@ -282,7 +282,10 @@ fn composite<S: Lanes, R: Record>(
     let open = simd.greater_than_f32s(next, simd.splat_f32s(TRANSMITTANCE_THRESHOLD));
     let drawn = simd.and_m32s(counts, open);
 
-    let weight = simd.select_f32s(drawn, simd.mul_f32s(t, alpha), simd.splat_f32s(0.0));
+    // What T lost, where the picture is drawn: that sums up to the 1 - T by which depth is divided, and T alpha does so but
+    // for rounding.
+    let weight = if R::COLOR { simd.sub_f32s(t, next) } else { simd.mul_f32s(t, alpha) };
+    let weight = simd.select_f32s(drawn, weight, simd.splat_f32s(0.0));
     if R::COLOR {
         for c in 0..3 {
             block.color[c] = simd.mul_add(weight, color[c], block.color[c]);
