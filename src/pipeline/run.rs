@@ -142,7 +142,7 @@ pub fn reconstruct_on<'a>(
 
     let (gaussians, refinement) = match &options.refine {
         Some(how) => {
-            let (refined, done) = refine::refine(gaussians, &clones, &seen, how, &context)?;
+            let (refined, done) = refine::refine(gaussians, &clones, &views, how, &context)?;
             (refined, Some(done))
         }
         None => (gaussians, None),

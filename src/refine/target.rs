@@ -22,6 +22,8 @@ pub(super) struct Target {
     known: Vec<f32>,
     /// Metres, as drawn at the beginning; 0 where nothing holds it. `[height * width]`
     depth: Vec<f32>,
+    /// Without a mask nothing is known but where something is drawn at the beginning.
+    has_mask: bool,
     /// Pictures smaller than its window have no SSIM.
     has_ssim: bool,
 }
@@ -50,12 +52,16 @@ impl Target {
             alpha: flags(Label::Vehicle, &labels),
             known: unknown.into_iter().map(|u| 1.0 - u).collect(),
             depth: vec![0.0; pixels],
+            has_mask: view.mask.is_some(),
             has_ssim: view.camera.width.min(view.camera.height) >= WINDOW,
         }
     }
 
     /// Holds the surface where this picture has it, inside the mask.
     pub(super) fn hold(&mut self, picture: &Rendered) {
+        if !self.has_mask {
+            self.known = picture.alpha.iter().map(|drawn| f32::from(u8::from(*drawn > 0.5))).collect();
+        }
         let drawn = picture.alpha.iter().zip(&picture.depth).zip(&self.alpha);
         let held = |((drawn, depth), alpha): ((&f32, &f32), &f32)| match *drawn > 0.5 && *alpha == 1.0 {
             true => *depth,

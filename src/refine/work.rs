@@ -97,9 +97,9 @@ impl<'a> Work<'a> {
             tie::made(&state.parameters, self.clones, &mut self.gaussians);
             let views = self.views.len();
             let one = |view: usize| {
-                let psnr = self.psnr_drawn(view, state)?;
+                self.draw(view)?;
                 self.targets[view].hold(&self.picture);
-                Ok(psnr)
+                Ok(self.psnr_of_drawn(view, state))
             };
             (0..views).map(one).collect()
         })
@@ -122,10 +122,19 @@ impl<'a> Work<'a> {
     }
 
     fn psnr_drawn(&mut self, view: usize, state: &State) -> Result<f64> {
+        self.draw(view)?;
+        Ok(self.psnr_of_drawn(view, state))
+    }
+
+    fn draw(&mut self, view: usize) -> Result<()> {
         let camera = &self.views[view].camera;
         self.renderer.render_into(&self.gaussians, camera, &self.render, &mut self.picture)?;
+        Ok(())
+    }
+
+    fn psnr_of_drawn(&mut self, view: usize, state: &State) -> f64 {
         let factor = state.exposure.factor(view);
-        Ok(self.targets[view].psnr_db(&self.picture, factor, &mut self.shown))
+        self.targets[view].psnr_db(&self.picture, factor, &mut self.shown)
     }
 
     /// The Gaussians of a state: originals, then clones.
