@@ -191,7 +191,10 @@ fn bounds(patch: &[usize], width: usize) -> [usize; 4] {
 
 /// Pixels between two boxes along the axis on which there are more.
 fn gap(a: [usize; 4], b: [usize; 4]) -> f64 {
-    let between = |k: usize| a[k].saturating_sub(b[k + 2]).max(b[k].saturating_sub(a[k + 2])) as f64;
+    let between = |k: usize| {
+        let apart = a[k].saturating_sub(b[k + 2]).max(b[k].saturating_sub(a[k + 2]));
+        apart.saturating_sub(1) as f64
+    };
     between(0).max(between(1))
 }
 
