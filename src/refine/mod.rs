@@ -2,8 +2,8 @@
 //!
 //! One step draws one view, takes the gradient of its error, and moves every parameter by Adam. Clones have no
 //! parameters of their own (`tie`): what a view of one side says, the other side follows. Photographs differ in
-//! exposure, which is solved for as well (`exposure`). One view takes no part and tells when to stop: pictures of the
-//! views that do take part always get better, the vehicle does not.
+//! exposure, which is solved for as well (`exposure`). A view can be held out to tell when to stop: pictures of the
+//! views that take part always get better, the vehicle need not.
 
 mod adam;
 mod exposure;
