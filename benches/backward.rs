@@ -17,7 +17,7 @@ use common::{Random, scenes};
 use glam::DVec3;
 use std::time::{Duration, Instant};
 use vg::render::cpu::GradientTimes;
-use vg::render::loss::{self, Term};
+use vg::render::loss::{self, Structure, Term};
 use vg::render::{CpuRenderer, Gradients, PictureGradient, RenderOptions, Rendered, Renderer};
 use vg::{Camera, Gaussians};
 
@@ -48,9 +48,11 @@ fn time_losses(picture: &Rendered) {
     let target: Vec<[f32; 3]> = picture.color.iter().map(|c| c.map(|v| 0.9 * v + 0.05)).collect();
     let term = Term::weighing(1.0);
     let mut gradient = PictureGradient::default();
-    let terms: [(&str, Loss); 4] = [
+    let structure = Structure::new(&target, [picture.width, picture.height], None).unwrap();
+    let terms: [(&str, Loss); 5] = [
         ("l1", &|g| loss::l1(picture, &target, term, g)),
         ("dissimilarity", &|g| loss::dissimilarity(picture, &target, term, g)),
+        ("its target kept", &|g| structure.dissimilarity(picture, 1.0, g)),
         ("silhouette", &|g| loss::silhouette(picture, &picture.depth, term, g)),
         ("depth_l1", &|g| loss::depth_l1(picture, &picture.alpha, term, g)),
     ];

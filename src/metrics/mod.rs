@@ -7,7 +7,7 @@ mod ssim;
 mod views;
 
 pub use ssim::ssim;
-pub(crate) use ssim::{SsimMaps, WINDOW};
+pub(crate) use ssim::{Reference, WINDOW};
 pub use views::ViewErrors;
 
 use crate::scene::View;

@@ -5,8 +5,12 @@ use rayon::prelude::*;
 /// Decay of the mean of gradients and of their squares.
 const BETA: [f32; 2] = [0.9, 0.999];
 
-/// Parameters one task works on.
+/// Parameters one task works on, at least.
 const CHUNK: usize = 1 << 14;
+/// Parameters in a row, at least: each is worked on by the widest vectors, whose results are the same.
+const ROW: usize = 256;
+/// Its square is far from the end of f32.
+const LARGEST: f32 = 1e18;
 
 /// The state of one array.
 #[derive(Clone, Debug)]
@@ -24,29 +28,34 @@ impl Adam {
         Self { first: vec![0.0; len], second: vec![0.0; len], steps: 0, noise }
     }
 
-    /// One step down the gradient; parameter i moves by not much more than `rate(i)`. A gradient that f32 can hold but
-    /// whose square it cannot counts as one that it can.
-    pub(super) fn step(
-        &mut self,
-        parameters: &mut [f32],
-        gradient: &[f32],
-        rate: impl Fn(usize) -> f32 + Sync,
-    ) {
-        /// Its square is far from the end of f32.
-        const LARGEST: f32 = 1e18;
+    /// One step down the gradient; parameter i moves by not much more than `rates[i % rates.len()]`. A gradient that f32
+    /// can hold but whose square it cannot counts as one that it can.
+    pub(super) fn step(&mut self, parameters: &mut [f32], gradient: &[f32], rates: &[f32]) {
         self.steps += 1;
-        let correction = BETA.map(|beta| 1.0 - beta.powi(self.steps));
+        let correction = BETA.map(|beta| 1.0 / (1.0 - beta.powi(self.steps)));
         let noise = self.noise;
-        let state = self.first.par_chunks_mut(CHUNK).zip(self.second.par_chunks_mut(CHUNK));
-        let all = state.zip(parameters.par_chunks_mut(CHUNK).zip(gradient.par_chunks(CHUNK)));
-        all.enumerate().for_each(|(chunk, ((first, second), (parameters, gradient)))| {
-            let numbers = first.iter_mut().zip(second).zip(parameters).zip(gradient);
-            for (i, (((m, v), p), g)) in (chunk * CHUNK..).zip(numbers) {
-                let g = g.clamp(-LARGEST, LARGEST);
-                *m = BETA[0] * *m + (1.0 - BETA[0]) * g;
-                *v = BETA[1] * *v + (1.0 - BETA[1]) * g * g;
-                *p -= rate(i) * (*m / correction[0]) / ((*v / correction[1]).sqrt() + noise);
-            }
+        // So many of the pattern that a row has no short loop.
+        let row = rates.repeat(ROW.div_ceil(rates.len()));
+        let chunk = row.len() * CHUNK.div_ceil(row.len());
+        let state = self.first.par_chunks_mut(chunk).zip(self.second.par_chunks_mut(chunk));
+        let all = state.zip(parameters.par_chunks_mut(chunk).zip(gradient.par_chunks(chunk)));
+        all.for_each(|((first, second), (parameters, gradient))| {
+            pulp::Arch::new().dispatch(
+                #[inline(always)]
+                || {
+                    let state = first.chunks_mut(row.len()).zip(second.chunks_mut(row.len()));
+                    let numbers = parameters.chunks_mut(row.len()).zip(gradient.chunks(row.len()));
+                    for ((m, v), (p, g)) in state.zip(numbers) {
+                        for ((m, v), ((p, g), rate)) in m.iter_mut().zip(v).zip(p.iter_mut().zip(g).zip(&row))
+                        {
+                            let g = g.clamp(-LARGEST, LARGEST);
+                            *m = BETA[0] * *m + (1.0 - BETA[0]) * g;
+                            *v = BETA[1] * *v + (1.0 - BETA[1]) * g * g;
+                            *p -= rate * (*m * correction[0]) / ((*v * correction[1]).sqrt() + noise);
+                        }
+                    }
+                },
+            );
         });
     }
 }
@@ -61,11 +70,11 @@ mod tests {
         let mut adam = Adam::new(2, 1e-15);
         for _ in 0..2000 {
             let gradient = [2.0 * x[0], 200.0 * (x[1] + 1.0)];
-            adam.step(&mut x, &gradient, |_| 0.01);
+            adam.step(&mut x, &gradient, &[0.01]);
         }
         assert!(x[0].abs() < 0.02 && (x[1] + 1.0).abs() < 0.02, "{x:?}");
         for _ in 0..10 {
-            adam.step(&mut x, &[f32::MAX, f32::MIN], |_| 0.01);
+            adam.step(&mut x, &[f32::MAX, f32::MIN], &[0.01]);
         }
         assert!(x.iter().all(|x| x.abs() < 1.2), "{x:?}");
     }
@@ -74,10 +83,10 @@ mod tests {
     fn a_step_is_as_the_paper_has_it() {
         let mut x = vec![0.0f32];
         let mut adam = Adam::new(1, 1e-8);
-        adam.step(&mut x, &[0.5], |_| 0.1);
+        adam.step(&mut x, &[0.5], &[0.1]);
         // The first step has the length of the rate.
         assert!((x[0] + 0.1).abs() < 1e-6);
-        adam.step(&mut x, &[-0.5], |_| 0.1);
+        adam.step(&mut x, &[-0.5], &[0.1]);
         let (m, v): (f64, f64) = (0.9 * 0.05 - 0.05, 0.999 * 0.00025 + 0.00025);
         let second = 0.1 * (m / (1.0 - 0.81)) / (v / (1.0 - 0.998_001)).sqrt();
         assert!((f64::from(x[0]) + 0.1 + second).abs() < 1e-6);

@@ -32,7 +32,7 @@ impl Exposure {
         let factor = self.factor(view);
         self.gradient.fill([0.0; 3]);
         self.gradient[view] = std::array::from_fn(|c| factor[c] * of_factor[c]);
-        self.adam.step(self.logs.as_flattened_mut(), self.gradient.as_flattened(), |_| rate);
+        self.adam.step(self.logs.as_flattened_mut(), self.gradient.as_flattened(), &[rate]);
         for c in 0..3 {
             let mean = self.logs.iter().map(|l| l[c]).sum::<f32>() / self.logs.len() as f32;
             self.logs.iter_mut().for_each(|l| l[c] = (l[c] - mean).clamp(-MOST, MOST));

@@ -159,25 +159,25 @@ impl Optimizer {
         radius_m: f32,
     ) {
         let means = parameters.means.as_flattened_mut();
-        self.means.step(means, gradients.means.as_flattened(), |_| rates.means * radius_m);
+        self.means.step(means, gradients.means.as_flattened(), &[rates.means * radius_m]);
         let rotations = parameters.rotations.as_flattened_mut();
-        self.rotations.step(rotations, gradients.rotations.as_flattened(), |_| rates.rotations);
+        self.rotations.step(rotations, gradients.rotations.as_flattened(), &[rates.rotations]);
         // ds/d(ln s) = s
         let log_scales = parameters.log_scales.as_flattened_mut();
         let of_log = |(s, g): (&f32, &f32)| s.exp() * g;
         self.gradient.clear();
         let scales = log_scales.par_iter().zip(gradients.scales.as_flattened()).map(of_log);
         self.gradient.par_extend(scales);
-        self.scales.step(log_scales, &self.gradient, |_| rates.scales);
+        self.scales.step(log_scales, &self.gradient, &[rates.scales]);
         // do/d(logit) = o (1 - o)
         let of_logit = |(x, g): (&f32, &f32)| sigmoid(*x) * sigmoid(-x) * g;
         self.gradient.clear();
         let opacities = parameters.logits.par_iter().zip(&gradients.opacities).map(of_logit);
         self.gradient.par_extend(opacities);
-        self.opacities.step(&mut parameters.logits, &self.gradient, |_| rates.opacities);
-        let stride = parameters.stride();
-        let rate = |k: usize| if k % stride < 3 { rates.colors } else { rates.view_dependence };
-        self.sh.step(&mut parameters.sh, &gradients.sh, rate);
+        self.opacities.step(&mut parameters.logits, &self.gradient, &[rates.opacities]);
+        let rate = |k: usize| if k < 3 { rates.colors } else { rates.view_dependence };
+        let of_color: Vec<f32> = (0..parameters.stride()).map(rate).collect();
+        self.sh.step(&mut parameters.sh, &gradients.sh, &of_color);
         parameters.bound();
     }
 }

@@ -6,7 +6,7 @@
 use super::RefineOptions;
 use crate::error::Result;
 use crate::metrics;
-use crate::render::loss::{self, Term};
+use crate::render::loss::{self, Structure, Term};
 use crate::render::{PictureGradient, Rendered};
 use crate::scene::View;
 use crate::scene::mask::Label;
@@ -24,8 +24,8 @@ pub(super) struct Target {
     depth: Vec<f32>,
     /// Without a mask nothing is known but where something is drawn at the beginning.
     has_mask: bool,
-    /// Pictures smaller than its window have no SSIM.
-    has_ssim: bool,
+    /// For SSIM; `None` before [`Target::hold`], and of pictures smaller than its window, which have no SSIM.
+    structure: Option<Structure>,
 }
 
 /// How far a picture is from a target.
@@ -39,8 +39,6 @@ pub(super) struct Loss {
 
 impl Target {
     pub(super) fn of(view: &View) -> Self {
-        /// Sides of SSIM's window, pixels.
-        const WINDOW: u32 = 11;
         let pixels = view.camera.width as usize * view.camera.height as usize;
         let labels = (0..pixels).map(|i| view.mask.as_ref().map_or(Label::Vehicle, |m| m.labels()[i]));
         let flags =
@@ -53,12 +51,12 @@ impl Target {
             known: unknown.into_iter().map(|u| 1.0 - u).collect(),
             depth: vec![0.0; pixels],
             has_mask: view.mask.is_some(),
-            has_ssim: view.camera.width.min(view.camera.height) >= WINDOW,
+            structure: None,
         }
     }
 
     /// Holds the surface where this picture has it, inside the mask.
-    pub(super) fn hold(&mut self, picture: &Rendered) {
+    pub(super) fn hold(&mut self, picture: &Rendered) -> Result<()> {
         if !self.has_mask {
             self.known = picture.alpha.iter().map(|drawn| f32::from(u8::from(*drawn > 0.5))).collect();
         }
@@ -68,6 +66,11 @@ impl Target {
             false => 0.0,
         };
         self.depth = drawn.map(held).collect();
+        let size = [picture.width, picture.height];
+        if size.into_iter().all(|side| side as usize >= metrics::WINDOW) {
+            self.structure = Some(Structure::new(&self.color, size, Some(self.known.clone()))?);
+        }
+        Ok(())
     }
 
     /// The loss of a picture drawn on nothing and shown with `factor`; adds to its gradient.
@@ -84,9 +87,8 @@ impl Target {
         let weighing = |weight: f32| Term::weighing(weight.into());
         let colors = weighing(1.0 - options.ssim).on(&self.known);
         let mut total = loss::l1(on_white, &self.color, colors, of_white)?;
-        if options.ssim > 0.0 && self.has_ssim {
-            let term = weighing(options.ssim).on(&self.known);
-            total += loss::dissimilarity(on_white, &self.color, term, of_white)?;
+        if let Some(structure) = self.structure.as_ref().filter(|_| options.ssim > 0.0) {
+            total += structure.dissimilarity(on_white, options.ssim.into(), of_white)?;
         }
         if options.silhouette > 0.0 {
             let term = weighing(options.silhouette).on(&self.known);

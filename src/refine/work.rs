@@ -98,7 +98,7 @@ impl<'a> Work<'a> {
             let views = self.views.len();
             let one = |view: usize| {
                 self.draw(view)?;
-                self.targets[view].hold(&self.picture);
+                self.targets[view].hold(&self.picture)?;
                 Ok(self.psnr_of_drawn(view, state))
             };
             (0..views).map(one).collect()

@@ -33,7 +33,7 @@ mod ssim;
 pub use color::{l1, mse};
 pub use depth::depth_l1;
 pub use silhouette::silhouette;
-pub use ssim::dissimilarity;
+pub use ssim::{Structure, dissimilarity};
 
 use crate::error::{Error, Result};
 use crate::render::Rendered;
@@ -65,17 +65,23 @@ impl<'a> Term<'a> {
     }
 
     fn validate(&self, picture: &Rendered) -> Result<()> {
-        if !self.weight.is_finite() {
-            return Err(Error::argument("term.weight", self.weight.to_string(), "a finite number"));
-        }
-        let Some(mask) = self.mask else { return Ok(()) };
-        check_len("term.mask", mask.len(), picture)?;
-        match mask.iter().position(|m| !(m.is_finite() && *m >= 0.0)) {
-            Some(i) => {
-                Err(Error::argument(format!("term.mask[{i}]"), mask[i].to_string(), "0 or more, finite"))
-            }
-            None => Ok(()),
-        }
+        check_weight(self.weight)?;
+        self.mask.map_or(Ok(()), |mask| check_mask(mask, picture))
+    }
+}
+
+fn check_weight(weight: f64) -> Result<()> {
+    if weight.is_finite() {
+        return Ok(());
+    }
+    Err(Error::argument("term.weight", weight.to_string(), "a finite number"))
+}
+
+fn check_mask(mask: &[f32], picture: &Rendered) -> Result<()> {
+    check_len("term.mask", mask.len(), picture)?;
+    match mask.iter().position(|m| !(m.is_finite() && *m >= 0.0)) {
+        Some(i) => Err(Error::argument(format!("term.mask[{i}]"), mask[i].to_string(), "0 or more, finite")),
+        None => Ok(()),
     }
 }
 
