@@ -7,12 +7,14 @@
 
 mod adam;
 mod exposure;
+mod model;
 mod options;
 mod parameters;
 mod target;
 pub(crate) mod tie;
 mod work;
 
+pub use model::model;
 pub use options::{Amount, RefineOptions};
 pub use parameters::Rates;
 
@@ -38,6 +40,8 @@ pub enum Stop {
     HeldOut,
     /// The error grew far beyond where it began: the steps are too large.
     Diverged,
+    /// No view sees anything of the model: there is nothing to begin with.
+    Unseen,
 }
 
 /// What a refinement did.
@@ -99,10 +103,11 @@ pub(crate) fn refine(
     let held_out = (options.hold_out && views.len() >= 3).then_some(views.len() / 2);
     let shown: Vec<usize> = (0..views.len()).filter(|v| Some(*v) != held_out).collect();
     let round = shown.len() as u32;
-    let before = work.begin(&state, context)?;
+    let (before, seen) = work.begin(&state, context)?;
     let setup = start.elapsed();
 
     let mut planned = match options.amount {
+        _ if !seen => Some(0),
         Amount::Iterations(n) => Some(n),
         Amount::Seconds(_) => None,
     };
@@ -111,7 +116,7 @@ pub(crate) fn refine(
     if let Some(v) = held_out {
         best.error = -before[v];
     }
-    let (mut made, mut stop) = (0, Stop::Done);
+    let (mut made, mut stop) = (0, if seen { Stop::Done } else { Stop::Unseen });
     let mut looks_in_vain = 0;
     while planned.is_none_or(|n| made < n) {
         let timed = TIMED_ROUNDS * round;

@@ -91,17 +91,19 @@ impl<'a> Work<'a> {
         })
     }
 
-    /// Holds the surface where `state` has it; what [`Work::psnr_db`] of it says.
-    pub(super) fn begin(&mut self, state: &State, context: &Context) -> Result<Vec<f64>> {
+    /// Holds the surface where `state` has it; what [`Work::psnr_db`] of it says, and whether any view sees it.
+    pub(super) fn begin(&mut self, state: &State, context: &Context) -> Result<(Vec<f64>, bool)> {
         context.parallel(|| {
             tie::made(&state.parameters, self.clones, &mut self.gaussians);
-            let views = self.views.len();
-            let one = |view: usize| {
+            let mut seen = false;
+            let mut psnr_db = Vec::with_capacity(self.views.len());
+            for view in 0..self.views.len() {
                 self.draw(view)?;
+                seen |= self.picture.alpha.iter().any(|alpha| *alpha > 0.0);
                 self.targets[view].hold(&self.picture)?;
-                Ok(self.psnr_of_drawn(view, state))
-            };
-            (0..views).map(one).collect()
+                psnr_db.push(self.psnr_of_drawn(view, state));
+            }
+            Ok((psnr_db, seen))
         })
     }
 

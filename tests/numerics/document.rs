@@ -58,7 +58,8 @@ The call that is made and what it answers. Errors are in their own words.
 const REFINEMENT: &str = "\
 ## Refinement
 
-40 steps planned on an ellipsoid of 4.4 x 1.8 x 1.4 m with four photographs of 48x36, depth given. All results are finite, and
+40 steps planned on an ellipsoid of 4.4 x 1.8 x 1.4 m with four photographs of 48x36, depth given; `a model` goes through
+`vg::refine::model` instead, against the same photographs. All results are finite, and
 none is worse in its own photographs than what it began with: where no step was better, `kept` is 0 and the beginning is given
 back.
 
@@ -103,6 +104,7 @@ fn page() -> String {
             vg::refine::Stop::Done => "all steps made",
             vg::refine::Stop::Diverged => "diverged: loss above 3 times the first",
             vg::refine::Stop::HeldOut => "the view held out got no better",
+            vg::refine::Stop::Unseen => "no view sees anything of it",
         };
         let [before, after] = done.psnr_db;
         let _ = writeln!(
