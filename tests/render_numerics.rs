@@ -3,11 +3,13 @@
 mod common;
 
 use common::scenes::{looking_at_origin, random};
-use common::{compare, is_finite};
+use common::{Random, compare, gradients, is_finite};
 use glam::{DMat3, DVec3};
 use vg::geometry::Distortion;
 use vg::geometry::camera::Intrinsics;
-use vg::render::{Background, CpuRenderer, DepthMode, Reference, RenderOptions, Rendered, Renderer};
+use vg::render::{
+    Background, CpuRenderer, DepthMode, PictureGradient, Reference, RenderOptions, Rendered, Renderer,
+};
 use vg::{Camera, Gaussians, Pose};
 
 const UNIT: [f32; 4] = [1.0, 0.0, 0.0, 0.0];
@@ -358,13 +360,86 @@ fn a_hundred_thousand_walls_cost_what_the_first_few_do() {
     assert!(picture.alpha.iter().all(|a| *a > 0.99));
 }
 
+/// Windows of the largest picture: [left, top] of 64x48 pixels.
+const WINDOWS: [[u32; 2]; 3] = [[0, 0], [4064, 4072], [8128, 8144]];
+
+/// Gaussians of about four pixels in each of these windows, as a camera at the origin with this focal length sees them.
+fn in_windows(focal: f64) -> Gaussians {
+    let mut r = Random::new(12);
+    let n = 120;
+    let mean = |i: usize| {
+        let [left, top] = WINDOWS[i % 3].map(f64::from);
+        let (u, v, d) = (left + r.uniform(2.0, 62.0), top + r.uniform(2.0, 46.0), r.uniform(3.0, 5.0));
+        [d, (4096.0 - u) / focal * d, (4096.0 - v) / focal * d].map(|v| v as f32)
+    };
+    let means = (0..n).map(mean).collect();
+    let rotations = (0..n).map(|_| [0; 4].map(|_| r.normal() as f32)).collect();
+    let scales = (0..n).map(|_| [0; 3].map(|_| (4.0 / focal * r.uniform(1.0, 8.0)) as f32)).collect();
+    let opacities = (0..n).map(|_| r.uniform(0.1, 1.0) as f32).collect();
+    let sh = (0..3 * n).map(|_| r.normal() as f32).collect();
+    Gaussians::from_arrays(0, means, rotations, scales, opacities, sh).unwrap()
+}
+
 #[test]
-fn the_largest_picture_is_drawn() {
-    let g = random(12, 200, 0, [0.01, 0.1]);
-    let camera = looking_at_origin(8192, 8192, DVec3::new(1.0, -0.3, 0.2), 7.0);
-    let options = RenderOptions { depth_mode: DepthMode::Accumulated, ..options() };
-    let picture = CpuRenderer::new().render(&g, &camera, &options).unwrap();
-    assert!(is_finite(&picture) && picture.alpha.iter().any(|&a| a > 0.5));
+fn the_largest_picture_and_its_gradients_are_those_of_its_windows() {
+    const SIDE: usize = 8192;
+    let focal = 6000.0;
+    let camera = forward(SIDE as u32, SIDE as u32, focal);
+    let g = in_windows(focal);
+    let window = |[left, top]: [u32; 2]| {
+        let mut window = forward(64, 48, focal);
+        (window.intrinsics.cx, window.intrinsics.cy) = (4096.0 - f64::from(left), 4096.0 - f64::from(top));
+        window
+    };
+    let pixel = |[left, top]: [u32; 2], i: usize| (top as usize + i / 64) * SIDE + left as usize + i % 64;
+    let weights: Vec<Vec<[f32; 3]>> =
+        (0..3).map(|seed| gradients::noise(seed, &window([0, 0])).color).collect();
+
+    let loss = |_: &Rendered| {
+        let mut gradient =
+            PictureGradient { width: SIDE as u32, height: SIDE as u32, ..PictureGradient::default() };
+        let of_color = gradient.color_mut();
+        for (at, weights) in WINDOWS.into_iter().zip(&weights) {
+            weights.iter().enumerate().for_each(|(i, w)| of_color[pixel(at, i)] = *w);
+        }
+        Ok(gradient)
+    };
+    let (picture, found) = CpuRenderer::new().render_with_gradients(&g, &camera, &options(), loss).unwrap();
+    let mut expected: Option<Vec<Vec<f64>>> = None;
+    for (at, weights) in WINDOWS.into_iter().zip(weights) {
+        let camera = window(at);
+        let alone = Reference.render(&g, &camera, &options()).unwrap();
+        let cut = |i: usize| {
+            let i = pixel(at, i);
+            (picture.color[i], picture.alpha[i], picture.depth[i])
+        };
+        let cut: Vec<_> = (0..64 * 48).map(cut).collect();
+        let cut = Rendered {
+            width: 64,
+            height: 48,
+            color: cut.iter().map(|c| c.0).collect(),
+            alpha: cut.iter().map(|c| c.1).collect(),
+            depth: cut.iter().map(|c| c.2).collect(),
+        };
+        assert!(cut.alpha.iter().filter(|a| **a > 0.5).count() > 500, "{at:?}");
+        assert_close(&format!("window at {at:?}"), &cut, &alone, 1e-6, 2e-5);
+        let gradient =
+            PictureGradient { width: 64, height: 48, color: weights, ..PictureGradient::default() };
+        let part = Reference.backward_f64(&g, &camera, &options(), &gradient).unwrap();
+        let part: Vec<Vec<f64>> =
+            gradients::tensors(&found, &part, &camera).into_iter().take(5).map(|t| t.2).collect();
+        let sum = expected.get_or_insert_with(|| part.iter().map(|t| vec![0.0; t.len()]).collect());
+        for (sum, part) in sum.iter_mut().flatten().zip(part.into_iter().flatten()) {
+            *sum += part;
+        }
+    }
+    let arrays = [found.means.as_flattened(), found.rotations.as_flattened(), found.scales.as_flattened()];
+    for (found, expected) in arrays.into_iter().chain([&*found.opacities, &found.sh]).zip(expected.unwrap()) {
+        let largest = gradients::largest(&expected);
+        let error = found.iter().zip(&expected).map(|(f, e)| (f64::from(*f) - e).abs()).fold(0.0, f64::max);
+        println!("gradient: {:.1e} of the largest, {largest:.1e}", error / largest);
+        assert!(error <= 1e-4 * largest, "{error} of {largest}");
+    }
 }
 
 /// One lens of every model, strong enough to move pixels by several.

@@ -61,6 +61,17 @@ pub(super) fn prior(asked: PriorChoice, all_have_depth: bool) -> PriorChoice {
     }
 }
 
+/// Why no pixel became a Gaussian, the most frequent reason first.
+pub(super) fn nothing_kept(left_out: &[LeftOut]) -> String {
+    let mut pixels: Vec<&LeftOut> = left_out.iter().filter(|l| l.what == "pixels").collect();
+    pixels.sort_by_key(|l| std::cmp::Reverse(l.count));
+    let reasons: Vec<String> = pixels.iter().map(|l| format!("{} {}", l.count, l.why)).collect();
+    format!(
+        "no pixel is left to make a Gaussian of: {}; check that masks and depth overlap",
+        reasons.join(", ")
+    )
+}
+
 /// The SH degree that the directions the vehicle is seen from can support: none for one direction; bands of
 /// degree l bend over angles of about pi / l, so a narrow fan of views determines low bands only.
 pub(super) fn sh_degree(

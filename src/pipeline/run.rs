@@ -127,10 +127,7 @@ pub fn reconstruct_on<'a>(
     };
     let gaussians = head.predict(&views, &geometry, &kept, &context)?;
     if gaussians.is_empty() {
-        return Err(Error::Reconstruction {
-            stage: "head",
-            reason: "no vehicle pixel has depth; check that masks and depth overlap".into(),
-        });
+        return Err(Error::Reconstruction { stage: "head", reason: plan::nothing_kept(&left_out) });
     }
     clock.lap("head");
 

@@ -172,7 +172,9 @@ proptest! {
     #[test]
     fn the_f32_picture_is_the_f64_picture(g in scene(), camera in camera()) {
         let exact = Reference.render(&g, &camera, &options()).unwrap();
-        assert_kept(&AGREES, &draw(&g, &camera), &exact)?;
+        for renderer in [CpuRenderer::new(), CpuRenderer::portable()] {
+            assert_kept(&AGREES, &renderer.render(&g, &camera, &options()).unwrap(), &exact)?;
+        }
     }
 
     #[test]
