@@ -127,49 +127,91 @@ struct Outputs {
     basis: [[f32; 16]; LANES],
 }
 
-/// One lane, without branches or closures, so that the compiler turns the loop over lanes into vectors.
-#[inline(always)]
-fn project_lane(view: &PinholeView, g: &Inputs, out: &mut Outputs, l: usize) {
-    let (opacity, w) = (f64::from(g.opacity[l]), f64::from(g.rotation[0][l]));
-    let qx = f64::from(g.rotation[1][l]);
-    let qy = f64::from(g.rotation[2][l]);
-    let qz = f64::from(g.rotation[3][l]);
+/// One Gaussian before its scale: where it is in the camera's frame, and the Jacobian there.
+pub(super) struct Placed {
+    /// From the camera's centre, vehicle frame.
+    pub(super) d: [f64; 3],
+    pub(super) depth: f64,
+    pub(super) inverse_z: f64,
+    /// x/z and y/z.
+    pub(super) point: [f64; 2],
+    /// The same, clamped to where the Jacobian is taken.
+    pub(super) clamped: [f64; 2],
+    /// fx/z and fy/z.
+    pub(super) magnification: [f64; 2],
+    /// Rows of J R: f/z (R_x - x/z R_z), with x/z clamped.
+    pub(super) jacobian: [[f64; 3]; 2],
+    /// (w, x, y, z) as stored.
+    pub(super) quaternion: [f64; 4],
+    /// 2/|q|^2: the quaternion is unit to f32 only, and this makes R_q a rotation to f64.
+    pub(super) two: f64,
+    /// Of R_q.
+    pub(super) columns: [[f64; 3]; 3],
+    /// Rows of J R R_q.
+    pub(super) rows: [[f64; 3]; 2],
+}
 
-    // Camera frame; the difference first, so that a distant camera costs no digits.
+/// What the way there and the way back begin with.
+#[inline(always)]
+pub(super) fn placed(view: &PinholeView, g: &Inputs, l: usize) -> Placed {
+    // The difference first, so that a distant camera costs no digits.
     let mut d = [0.0; 3];
     for k in 0..3 {
         d[k] = f64::from(g.mean[k][l]) - view.center[k];
     }
     let r = &view.rotation;
-    let z = dot(r[2], d);
-    let depth = z as f32;
-    let inverse_z = 1.0 / z;
+    let depth = dot(r[2], d);
+    let inverse_z = 1.0 / depth;
     let (x, y) = (dot(r[0], d) * inverse_z, dot(r[1], d) * inverse_z);
-    let i = &view.intrinsics;
-    let (u, v) = (i.fx * x + i.cx, i.fy * y + i.cy);
-
-    // Rows of J R: f/z (R_x - x/z R_z), with x/z clamped.
     let [xr, yr] = view.jacobian_range;
-    let (x, y) = (x.max(xr[0]).min(xr[1]), y.max(yr[0]).min(yr[1]));
-    let (sx, sy) = (i.fx * inverse_z, i.fy * inverse_z);
+    let (xc, yc) = (x.max(xr[0]).min(xr[1]), y.max(yr[0]).min(yr[1]));
+    let (sx, sy) = (view.intrinsics.fx * inverse_z, view.intrinsics.fy * inverse_z);
     let (mut jx, mut jy) = ([0.0; 3], [0.0; 3]);
     for k in 0..3 {
-        jx[k] = sx * (r[0][k] - x * r[2][k]);
-        jy[k] = sy * (r[1][k] - y * r[2][k]);
+        jx[k] = sx * (r[0][k] - xc * r[2][k]);
+        jy[k] = sy * (r[1][k] - yc * r[2][k]);
     }
-
-    // Rows of J R R_q S. The quaternion is unit to f32 only; 2/|q|^2 makes R_q a rotation to f64.
+    let (w, qx) = (f64::from(g.rotation[0][l]), f64::from(g.rotation[1][l]));
+    let (qy, qz) = (f64::from(g.rotation[2][l]), f64::from(g.rotation[3][l]));
     let two = 2.0 / (w * w + qx * qx + qy * qy + qz * qz);
     let columns = [
         [1.0 - two * (qy * qy + qz * qz), two * (qx * qy + w * qz), two * (qx * qz - w * qy)],
         [two * (qx * qy - w * qz), 1.0 - two * (qx * qx + qz * qz), two * (qy * qz + w * qx)],
         [two * (qx * qz + w * qy), two * (qy * qz - w * qx), 1.0 - two * (qx * qx + qy * qy)],
     ];
+    let (mut pa, mut pb) = ([0.0; 3], [0.0; 3]);
+    for k in 0..3 {
+        pa[k] = dot(jx, columns[k]);
+        pb[k] = dot(jy, columns[k]);
+    }
+    Placed {
+        d,
+        depth,
+        inverse_z,
+        point: [x, y],
+        clamped: [xc, yc],
+        magnification: [sx, sy],
+        jacobian: [jx, jy],
+        quaternion: [w, qx, qy, qz],
+        two,
+        columns,
+        rows: [pa, pb],
+    }
+}
+
+/// One lane, without branches or closures, so that the compiler turns the loop over lanes into vectors.
+#[inline(always)]
+fn project_lane(view: &PinholeView, g: &Inputs, out: &mut Outputs, l: usize) {
+    let Placed { d, depth: z, point: [x, y], rows: [pa, pb], .. } = placed(view, g, l);
+    let (opacity, depth) = (f64::from(g.opacity[l]), z as f32);
+    let i = &view.intrinsics;
+    let (u, v) = (i.fx * x + i.cx, i.fy * y + i.cy);
+    // Rows of J R R_q S.
     let (mut a, mut b) = ([0.0; 3], [0.0; 3]);
     for k in 0..3 {
         let scale = f64::from(g.scale[k][l]);
-        a[k] = dot(jx, columns[k]) * scale;
-        b[k] = dot(jy, columns[k]) * scale;
+        a[k] = pa[k] * scale;
+        b[k] = pb[k] * scale;
     }
 
     // Covariance, determinant and pivot.

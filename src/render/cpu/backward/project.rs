@@ -18,7 +18,7 @@
 //!   `det_0 det` rather than the difference of two inverses.
 
 use super::super::color;
-use super::super::project::{Inputs, LANES, dot};
+use super::super::project::{Inputs, LANES, Placed, dot, placed};
 use super::super::splat::Splat;
 use super::super::view::PinholeView;
 use super::blend::SplatSums;
@@ -150,41 +150,18 @@ struct Outputs {
 /// One lane, without branches or closures, so that the compiler turns the loop over lanes into vectors.
 #[inline(always)]
 fn project_lane(view: &PinholeView, g: &Inputs, upstream: &[[f64; LANES]; 10], out: &mut Outputs, l: usize) {
-    // Forward once more, with the same formulas as `project`.
-    let w = f64::from(g.rotation[0][l]);
-    let qx = f64::from(g.rotation[1][l]);
-    let qy = f64::from(g.rotation[2][l]);
-    let qz = f64::from(g.rotation[3][l]);
-    let mut d = [0.0; 3];
-    for k in 0..3 {
-        d[k] = f64::from(g.mean[k][l]) - view.center[k];
-    }
-    let r = &view.rotation;
-    let inverse_z = 1.0 / dot(r[2], d);
-    let (x, y) = (dot(r[0], d) * inverse_z, dot(r[1], d) * inverse_z);
-    let i = &view.intrinsics;
+    let placed = placed(view, g, l);
+    let Placed {
+        d, inverse_z, point: [x, y], clamped: [xc, yc], magnification: [sx, sy], two, columns, ..
+    } = placed;
+    let Placed { jacobian: [jx, jy], quaternion: [w, qx, qy, qz], rows: [pa, pb], .. } = placed;
+    let (r, i) = (&view.rotation, &view.intrinsics);
     let [xr, yr] = view.jacobian_range;
-    let (xc, yc) = (x.max(xr[0]).min(xr[1]), y.max(yr[0]).min(yr[1]));
-    let (sx, sy) = (i.fx * inverse_z, i.fy * inverse_z);
-    let (mut jx, mut jy) = ([0.0; 3], [0.0; 3]);
-    for k in 0..3 {
-        jx[k] = sx * (r[0][k] - xc * r[2][k]);
-        jy[k] = sy * (r[1][k] - yc * r[2][k]);
-    }
-    let two = 2.0 / (w * w + qx * qx + qy * qy + qz * qz);
-    let columns = [
-        [1.0 - two * (qy * qy + qz * qz), two * (qx * qy + w * qz), two * (qx * qz - w * qy)],
-        [two * (qx * qy - w * qz), 1.0 - two * (qx * qx + qz * qz), two * (qy * qz + w * qx)],
-        [two * (qx * qz + w * qy), two * (qy * qz - w * qx), 1.0 - two * (qx * qx + qy * qy)],
-    ];
-    let (mut pa, mut pb) = ([0.0; 3], [0.0; 3]);
     let (mut a, mut b) = ([0.0; 3], [0.0; 3]);
     let (mut s, mut s2) = ([0.0; 3], [0.0; 3]);
     for k in 0..3 {
         s[k] = f64::from(g.scale[k][l]);
         s2[k] = s[k] * s[k];
-        pa[k] = dot(jx, columns[k]);
-        pb[k] = dot(jy, columns[k]);
         a[k] = pa[k] * s[k];
         b[k] = pb[k] * s[k];
     }
