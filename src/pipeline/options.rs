@@ -199,7 +199,7 @@ impl Options {
             (
                 "budget_s",
                 self.budget_s.is_none(),
-                format!("{:?}", self.budget_s),
+                format!("{} s", self.budget_s.unwrap_or(0.0)),
                 "none; the amount is the baseline's",
             ),
             ("points", !self.points, "true".into(), "false"),
