@@ -2,8 +2,9 @@
 //!
 //! One step draws one view, takes the gradient of its error, and moves every parameter by Adam. Clones have no
 //! parameters of their own (`tie`): what a view of one side says, the other side follows. Photographs differ in
-//! exposure, which is solved for as well (`exposure`). A view can be held out to tell when to stop: pictures of the
-//! views that take part always get better, the vehicle need not.
+//! exposure, which is solved for as well (`exposure`). Gaussians may divide and go on the way (`densify`). A view can be
+//! held out to tell when to stop: pictures of the views that take part always get better, the vehicle need not.
+//! [`baseline`] is another method on the same footing.
 
 mod adam;
 pub mod baseline;
