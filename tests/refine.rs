@@ -5,7 +5,7 @@ mod common;
 use common::vehicle::{HALF, right_side, without_depth};
 use std::ops::ControlFlow;
 use vg::pipeline::{Calibrate, Options, PriorChoice, Reconstruction, reconstruct};
-use vg::refine::{Amount, Rates, RefineOptions, Stop};
+use vg::refine::{Amount, Densify, Rates, RefineOptions, Stop};
 use vg::relight::Relight;
 use vg::symmetry::SymmetryMode;
 use vg::{Error, Scene};
@@ -82,6 +82,26 @@ fn a_view_held_out_tells_when_to_stop() {
     // Of two views none can be spared.
     let two = Scene { views: scene.views[..2].to_vec(), cloud: None };
     assert!(run(&two, &options(held)).report.refinement.unwrap().held_out.is_none());
+}
+
+#[test]
+fn who_divides_keeps_a_mirror_image() {
+    let scene = right_side(64, 48);
+    // All that is seen wants company.
+    let densify = Some(Densify { gradient: 0.0, most: 9_000, ..Densify::of_refinement() });
+    let of =
+        |threads: usize| run(&scene, &Options { threads, ..options(RefineOptions { densify, ..steps(60) }) });
+    let made = of(2);
+    assert!(made.gaussians == of(3).gaussians);
+    let done = made.report.refinement.as_ref().unwrap().densified.unwrap();
+    assert!(done.cloned > 0 && done.resets == 0, "{done:?}");
+    let (g, n) = (&made.gaussians, made.gaussians.len() / 2);
+    assert!(g.len() <= 9_000 && g.len() > made.report.symmetry.cloned, "{}", g.len());
+    for i in 0..n {
+        let [x, y, z] = g.means()[i];
+        assert_eq!(g.means()[n + i], [x, -y, z]);
+        assert_eq!((g.scales()[n + i], g.opacities()[n + i]), (g.scales()[i], g.opacities()[i]));
+    }
 }
 
 #[test]

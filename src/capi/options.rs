@@ -249,6 +249,7 @@ impl vg_options {
             budget_s: (self.budget_s != 0.0).then_some(self.budget_s),
             resolution: self.resolution,
             max_views: (self.max_views != 0).then_some(self.max_views),
+            baseline: None,
             points: read::flag("options.points", self.points)?,
             threads: 0,
         })

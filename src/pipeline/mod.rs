@@ -1,6 +1,8 @@
 //! The main job: scene in, vehicle out, with a plan of what the scene needs and a report of what was done.
 
+mod baseline;
 pub mod budget;
+mod check;
 mod cost;
 pub mod machine;
 pub mod options;

@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::onnx::{self, Model};
 use crate::refine::RefineOptions;
+use crate::refine::baseline::BaselineOptions;
 use crate::relight::Relight;
 use crate::symmetry::SymmetryMode;
 use serde::{Deserialize, Serialize};
@@ -100,6 +101,10 @@ pub struct Options {
     pub points: bool,
     /// How the result is optimised against the photographs; `None`, the default: it is not.
     pub refine: Option<RefineOptions>,
+    /// 3D Gaussian splatting instead of everything between the choice of views and the check, for comparison; `None`,
+    /// the default: this library's method. What is of that method alone is then as it is by default or refused; `calibrate`,
+    /// `relight`, `sh_degree`, `photo` and all of `keep` but the views are not looked at.
+    pub baseline: Option<BaselineOptions>,
 }
 
 impl Default for Options {
@@ -122,6 +127,7 @@ impl Default for Options {
             threads: 0,
             points: false,
             refine: None,
+            baseline: None,
         }
     }
 }
@@ -173,8 +179,37 @@ impl Options {
         if let Some(refine) = &self.refine {
             refine.validate()?;
         }
+        if let Some(baseline) = &self.baseline {
+            self.validate_beside_baseline()?;
+            baseline.validate()?;
+        }
         if self.sh_degree > crate::gaussians::sh::MAX_DEGREE {
             return Err(Error::argument("options.sh_degree", self.sh_degree.to_string(), "0 to 3"));
+        }
+        Ok(())
+    }
+
+    /// What a baseline has not.
+    fn validate_beside_baseline(&self) -> Result<()> {
+        let symmetry = matches!(self.symmetry, SymmetryMode::Auto | SymmetryMode::Never);
+        let fields = [
+            ("prior", self.prior == PriorChoice::Auto, self.prior.name().to_owned(), "auto"),
+            ("head_model", self.head_model.is_none(), "a network".into(), "none"),
+            ("symmetry", symmetry, format!("{:?}", self.symmetry).to_lowercase(), "auto or never"),
+            (
+                "budget_s",
+                self.budget_s.is_none(),
+                format!("{} s", self.budget_s.unwrap_or(0.0)),
+                "none; the amount is the baseline's",
+            ),
+            ("points", !self.points, "true".into(), "false"),
+            ("refine", self.refine.is_none(), "a refinement".into(), "none; the amount is the baseline's"),
+        ];
+        for (name, fits, found, allowed) in fields {
+            if !fits {
+                let found = format!("{found}, with a baseline");
+                return Err(Error::argument(format!("options.{name}"), found, allowed));
+            }
         }
         Ok(())
     }

@@ -13,7 +13,8 @@ use std::time::Instant;
 /// One stage of the run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Stage {
-    /// plan, undistort, calibrate, prior, pixels, head, symmetry, refine, check.
+    /// plan, undistort, calibrate, prior, pixels, head, symmetry, refine, check; of a baseline plan, undistort, start,
+    /// refine, check.
     pub name: &'static str,
     /// Wall time, milliseconds.
     pub ms: f64,
@@ -63,9 +64,9 @@ impl From<VehicleBox> for BoxReport {
 pub struct Report {
     /// Version of this library.
     pub version: &'static str,
-    /// Depth source that was used.
+    /// Depth source that was used; none for a baseline.
     pub prior: &'static str,
-    /// Gaussian head that was used.
+    /// Gaussian head that was used; of a baseline its name.
     pub head: &'static str,
     /// Wall time of each stage, in order.
     pub stages: Vec<Stage>,
@@ -85,7 +86,8 @@ pub struct Report {
     pub views_used: Vec<String>,
     /// How the cameras were corrected; `None` if that was switched off or these views cannot be calibrated.
     pub calibration: Option<Calibration>,
-    /// The box the prior worked in, in the corrected frame: its sides are parallel to the plane of symmetry.
+    /// The box the prior worked in, in the corrected frame: its sides are parallel to the plane of symmetry. The box
+    /// a baseline's first Gaussians were drawn from.
     #[serde(rename = "box")]
     pub vehicle_box: Option<BoxReport>,
     /// What the prior made of the scene's cloud.

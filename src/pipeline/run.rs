@@ -1,22 +1,21 @@
 //! The run: plan -> undistort -> calibrate -> prior -> pixels -> head -> symmetry -> check.
 
+use super::check::input_error;
 use super::options::{Calibrate, Options, PriorChoice};
 use super::pixels::{self, BETTER};
-use super::report::{Clock, InputError, LeftOut, Report, peak_rss_bytes};
+use super::report::{Clock, LeftOut, Report, peak_rss_bytes};
 use super::spread::spread;
-use super::{budget, cost, plan};
+use super::{baseline, budget, cost, plan};
 use crate::calibrate::{self, Calibrated, Moved};
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
 use crate::geometry::{Camera, Similarity};
 use crate::head::surfel::FOOTPRINT_SIGMA_PX;
 use crate::head::{GaussianHead, NetworkHead, SurfelHead};
-use crate::metrics;
 use crate::prior::{DepthPrior, Geometry, GivenDepth, HullPrior, NetworkPrior, ShapePrior};
 use crate::progress::{Context, ProgressCallback, Threads};
 use crate::refine::{self, tie::Clone as Tied};
 use crate::relight::{Light, Relight, Relighting};
-use crate::render::{CpuRenderer, RenderOptions, Renderer};
 use crate::scene::visibility::{Observer, SURFACE_M, Sight};
 use crate::scene::{Cloud, Scene, View, mirror, resize, undistort};
 use crate::symmetry::{self, Completion, MirroredPlace, SymmetryMode};
@@ -73,6 +72,9 @@ pub fn reconstruct_on<'a>(
     scene.validate()?;
     let context = Context::new(threads, progress);
     let mut clock = Clock::start();
+    if let Some(how) = &options.baseline {
+        return baseline::reconstruct(scene, options, how, clock, &context);
+    }
 
     context.report("plan", 0.0)?;
     let mut left_out = Vec::new();
@@ -187,7 +189,7 @@ pub fn reconstruct_on<'a>(
 }
 
 /// As many of the used views as the caller wants.
-fn chosen_views(
+pub(super) fn chosen_views(
     scene: &Scene,
     used: Vec<usize>,
     options: &Options,
@@ -201,7 +203,7 @@ fn chosen_views(
 }
 
 /// The views at the resolution to work at, as pinholes.
-fn undistorted(
+pub(super) fn undistorted(
     scene: &Scene,
     used: &[usize],
     options: &Options,
@@ -327,19 +329,4 @@ fn back_in_vehicle(
     let back = &moved.vehicle_from_corrected;
     let gaussians = context.parallel(|| gaussians.transformed(back))?;
     Ok((gaussians, points.map(|cloud| cloud.transformed(back)), moved.in_vehicle.clone()))
-}
-
-/// The model drawn into the views it came from.
-fn input_error(gaussians: &Gaussians, views: &[View], context: &Context) -> Result<InputError> {
-    let renderer = CpuRenderer::new();
-    let mut error = InputError { psnr_db: 0.0, silhouette_iou: 0.0, mask_covered: 1.0 };
-    for (i, view) in views.iter().enumerate() {
-        context.report("check", i as f64 / views.len() as f64)?;
-        let rendered =
-            context.parallel(|| renderer.render(gaussians, &view.camera, &RenderOptions::default()))?;
-        error.psnr_db += metrics::psnr(&rendered.color, &metrics::on_white(view)) / views.len() as f64;
-        error.silhouette_iou += metrics::silhouette_iou(&rendered.alpha, view) / views.len() as f64;
-        error.mask_covered = error.mask_covered.min(metrics::mask_covered(&rendered.alpha, view));
-    }
-    Ok(error)
 }

@@ -28,6 +28,24 @@ impl Adam {
         Self { first: vec![0.0; len], second: vec![0.0; len], steps: 0, noise }
     }
 
+    /// Goes on with other parameters, `width` numbers each, made of those in `sources`: the first `survivors` of them
+    /// keep their state, the others begin.
+    pub(super) fn follow(&mut self, sources: &[u32], survivors: usize, width: usize) {
+        for state in [&mut self.first, &mut self.second] {
+            let of = |&i: &u32| &state[i as usize * width..(i as usize + 1) * width];
+            let mut followed: Vec<f32> = Vec::with_capacity(sources.len() * width);
+            sources[..survivors].iter().for_each(|i| followed.extend_from_slice(of(i)));
+            followed.resize(sources.len() * width, 0.0);
+            *state = followed;
+        }
+    }
+
+    /// Forgets all gradients.
+    pub(super) fn forget(&mut self) {
+        self.first.fill(0.0);
+        self.second.fill(0.0);
+    }
+
     /// One step down the gradient; parameter i moves by not much more than `rates[i % rates.len()]`. A gradient that f32
     /// can hold but whose square it cannot counts as one that it can.
     pub(super) fn step(&mut self, parameters: &mut [f32], gradient: &[f32], rates: &[f32]) {
@@ -77,6 +95,23 @@ mod tests {
             adam.step(&mut x, &[f32::MAX, f32::MIN], &[0.01]);
         }
         assert!(x.iter().all(|x| x.abs() < 1.2), "{x:?}");
+    }
+
+    #[test]
+    fn survivors_keep_their_state_and_others_begin() {
+        let step = |adam: &mut Adam, x: &mut [f32], g: &[f32]| {
+            let before = x.to_vec();
+            adam.step(x, g, &[0.1]);
+            x.iter().zip(before).map(|(a, b)| a - b).collect::<Vec<_>>()
+        };
+        let mut whole = Adam::new(4, 1e-8);
+        step(&mut whole, &mut [0.0; 4], &[1.0, 2.0, -3.0, 4.0]);
+        let mut followed = whole.clone();
+        followed.follow(&[1, 0, 0], 1, 2);
+        let moved = step(&mut whole, &mut [0.0; 4], &[0.0; 4]);
+        assert_eq!(step(&mut followed, &mut [0.0; 6], &[0.0; 6]), [moved[2], moved[3], 0.0, 0.0, 0.0, 0.0]);
+        followed.forget();
+        assert_eq!(step(&mut followed, &mut [0.0; 6], &[0.0; 6]), [0.0; 6]);
     }
 
     #[test]

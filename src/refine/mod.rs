@@ -2,18 +2,24 @@
 //!
 //! One step draws one view, takes the gradient of its error, and moves every parameter by Adam. Clones have no
 //! parameters of their own (`tie`): what a view of one side says, the other side follows. Photographs differ in
-//! exposure, which is solved for as well (`exposure`). A view can be held out to tell when to stop: pictures of the
-//! views that take part always get better, the vehicle need not.
+//! exposure, which is solved for as well (`exposure`). Gaussians may divide and go on the way (`densify`). A view can be
+//! held out to tell when to stop: pictures of the views that take part always get better, the vehicle need not.
+//! [`baseline`] is another method on the same footing.
 
 mod adam;
+pub mod baseline;
+mod chance;
+mod densify;
 mod exposure;
 mod model;
 mod options;
 mod parameters;
+mod plan;
 mod target;
 pub(crate) mod tie;
 mod work;
 
+pub use densify::{Densified, Densify};
 pub use model::model;
 pub use options::{Amount, RefineOptions};
 pub use parameters::Rates;
@@ -24,11 +30,12 @@ use crate::progress::Context;
 use crate::scene::View;
 use exposure::Exposure;
 use parameters::Parameters;
+use plan::Plan;
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::time::Instant;
 use tie::Clone as Tied;
-use work::Work;
+use work::{Measures, Work};
 
 /// Why a refinement ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -63,6 +70,8 @@ pub struct Refinement {
     pub held_out: Option<HeldOut>,
     /// Factors of the views' exposures, RGB, in the order of the views.
     pub exposures: Vec<[f32; 3]>,
+    /// What density control did, where it was wanted.
+    pub densified: Option<Densified>,
 }
 
 /// The view that took no part.
@@ -80,8 +89,8 @@ const LOOKS: u32 = 20;
 const PATIENCE: u32 = 4;
 /// A mean loss this many times the first never comes back.
 const DIVERGED: f64 = 3.0;
-/// Rounds over the views that tell how long a step takes, at the full step size.
-const TIMED_ROUNDS: u32 = 2;
+/// Gradients of this size are noise of single pixels: a loss is a mean over all pixels.
+const NOISE: f32 = 1e-9;
 /// Step sizes at the end, as a share of those at the beginning.
 const LAST_RATE: f32 = 0.1;
 
@@ -96,21 +105,18 @@ pub(crate) fn refine(
 ) -> Result<(Gaussians, Refinement)> {
     let start = Instant::now();
     gaussians.truncate(gaussians.len() - clones.len());
-    let mut work = Work::new(&gaussians, clones, views, options);
-    let beginning = State { parameters: Parameters::of(&gaussians), exposure: Exposure::new(views.len()) };
+    let beginning = State::of(&gaussians, clones, views.len());
+    let measures = Measures { noise: NOISE, extent_m: half_diagonal_m(&gaussians), seed: 0 };
+    let mut work = Work::new(&beginning, views, options, measures);
     let mut state = beginning.clone();
     drop(gaussians);
     let held_out = (options.hold_out && views.len() >= 3).then_some(views.len() / 2);
     let shown: Vec<usize> = (0..views.len()).filter(|v| Some(*v) != held_out).collect();
     let round = shown.len() as u32;
     let (before, seen) = work.begin(&state, context)?;
-    let setup = start.elapsed();
 
-    let mut planned = match options.amount {
-        _ if !seen => Some(0),
-        Amount::Iterations(n) => Some(n),
-        Amount::Seconds(_) => None,
-    };
+    let amount = if seen { options.amount } else { Amount::Iterations(0) };
+    let mut plan = Plan::new(amount, round, start);
     let mut course = Course::default();
     let mut best = Best { error: f64::INFINITY, step: 0, state: state.clone() };
     if let Some(v) = held_out {
@@ -118,19 +124,17 @@ pub(crate) fn refine(
     }
     let (mut made, mut stop) = (0, if seen { Stop::Done } else { Stop::Unseen });
     let mut looks_in_vain = 0;
-    while planned.is_none_or(|n| made < n) {
-        let timed = TIMED_ROUNDS * round;
-        let rates = options.rates.times(decay(made, timed, planned));
+    while plan.goes_on(made) {
+        // As in 3DGS, step sizes fall exponentially.
+        let rates = options.rates.times(LAST_RATE.powf(plan.part(made)));
         let view = shown[(made % round) as usize];
         course.push(work.step(view, &mut state, &rates, context)?, round);
         made += 1;
-        if let (None, Amount::Seconds(seconds)) = (planned, options.amount)
-            && made == timed
-        {
-            let step = (start.elapsed() - setup).as_secs_f64() / f64::from(made);
-            planned = Some(fitting(seconds, setup.as_secs_f64(), step).max(made));
+        plan.note(made);
+        if let Some(planned) = plan.planned_at(made) {
+            work.densify(&mut state, made, planned, context);
         }
-        let Some(planned) = planned else { continue };
+        let Some(planned) = plan.planned() else { continue };
         context.report_loss("refine", f64::from(made) / f64::from(planned), course.last)?;
         let every = (planned / LOOKS).max(round);
         if made % every != 0 && made != planned {
@@ -163,7 +167,7 @@ pub(crate) fn refine(
         false => (best, after),
     };
     let report = Refinement {
-        iterations: planned.unwrap_or(made),
+        iterations: plan.planned().unwrap_or(made),
         made,
         kept: best.step,
         stop,
@@ -171,31 +175,33 @@ pub(crate) fn refine(
         psnr_db: [shown_mean(&before), shown_mean(&after)],
         held_out: held_out.map(|v| HeldOut { view: views[v].name.clone(), psnr_db: [before[v], after[v]] }),
         exposures: (0..views.len()).map(|v| best.state.exposure.factor(v)).collect(),
+        densified: work.densified(),
     };
     Ok((work.finished(&best.state, context), report))
 }
 
-/// Share of the step size at a step: the full one while steps are timed, then it falls exponentially, as in 3DGS.
-fn decay(step: u32, timed: u32, planned: Option<u32>) -> f32 {
-    match planned {
-        Some(planned) if step > timed => {
-            LAST_RATE.powf((step - timed) as f32 / planned.saturating_sub(timed).max(1) as f32)
-        }
-        _ => 1.0,
-    }
-}
-
-/// Steps of `step` seconds that fit into `seconds`, of which setting up took `setup`, and a last look takes about as
-/// much.
-fn fitting(seconds: f64, setup: f64, step: f64) -> u32 {
-    ((seconds - 2.0 * setup) / step) as u32
+/// Half the diagonal of the box that holds all centres, metres.
+fn half_diagonal_m(gaussians: &Gaussians) -> f32 {
+    let diagonal =
+        |(low, high): ([f32; 3], [f32; 3])| (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f32>().sqrt();
+    gaussians.bounds().map_or(1.0, |bounds| 0.5 * diagonal(bounds)).clamp(1e-3, 1e3)
 }
 
 /// Everything that steps change.
 #[derive(Clone, Debug)]
 struct State {
+    /// Of the originals.
     parameters: Parameters,
+    /// Who follows them.
+    clones: Vec<Tied>,
     exposure: Exposure,
+}
+
+impl State {
+    fn of(originals: &Gaussians, clones: &[Tied], views: usize) -> Self {
+        let parameters = Parameters::of(originals);
+        Self { parameters, clones: clones.to_vec(), exposure: Exposure::new(views) }
+    }
 }
 
 /// The state that was best, and after which step.

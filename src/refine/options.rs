@@ -1,5 +1,6 @@
 //! What a caller may choose of a refinement.
 
+use super::densify::Densify;
 use super::parameters::Rates;
 use crate::error::{Error, Result};
 use serde::Serialize;
@@ -33,6 +34,8 @@ pub struct RefineOptions {
     pub exposure: bool,
     /// Whether one of three or more views takes no part and tells when to stop.
     pub hold_out: bool,
+    /// Whether Gaussians divide and go on the way; `None`, the default: they do not.
+    pub densify: Option<Densify>,
 }
 
 impl Default for RefineOptions {
@@ -53,6 +56,7 @@ impl Default for RefineOptions {
             depth: 0.2,
             exposure: true,
             hold_out: false,
+            densify: None,
         }
     }
 }
@@ -60,8 +64,13 @@ impl Default for RefineOptions {
 impl RefineOptions {
     /// Each field in its range.
     pub fn validate(&self) -> Result<()> {
+        self.validate_as("options.refine")
+    }
+
+    /// The same where this is called `argument`.
+    pub(super) fn validate_as(&self, argument: &str) -> Result<()> {
         let refuse = |field: &str, found: String, allowed: &str| {
-            Err(Error::argument(format!("options.refine.{field}"), found, allowed))
+            Err(Error::argument(format!("{argument}.{field}"), found, allowed))
         };
         match self.amount {
             Amount::Iterations(n) if n > MOST_ITERATIONS => {
@@ -82,7 +91,7 @@ impl RefineOptions {
                 return refuse(&format!("rates.{name}"), rate.to_string(), "0 to 10");
             }
         }
-        Ok(())
+        self.densify.map_or(Ok(()), |densify| densify.validate(&format!("{argument}.densify")))
     }
 }
 

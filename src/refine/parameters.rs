@@ -97,6 +97,23 @@ impl Parameters {
         }
     }
 
+    /// Copies of those in `sources`, in this order.
+    pub(super) fn gathered(&self, sources: &[u32]) -> Self {
+        fn of<T: Copy>(all: &[T], sources: &[u32]) -> Vec<T> {
+            sources.iter().map(|&i| all[i as usize]).collect()
+        }
+        let stride = self.stride();
+        let color = |&i: &u32| &self.sh[i as usize * stride..(i as usize + 1) * stride];
+        Self {
+            sh_degree: self.sh_degree,
+            means: of(&self.means, sources),
+            rotations: of(&self.rotations, sources),
+            log_scales: of(&self.log_scales, sources),
+            logits: of(&self.logits, sources),
+            sh: sources.iter().flat_map(color).copied().collect(),
+        }
+    }
+
     pub(super) fn len(&self) -> usize {
         self.logits.len()
     }
@@ -148,6 +165,20 @@ impl Optimizer {
             sh: Adam::new(3 * n * sh::coefficients(sh_degree), noise),
             gradient: Vec::new(),
         }
+    }
+
+    /// Goes on with parameters made of those in `sources`, of which the first `survivors` keep their state.
+    pub(super) fn follow(&mut self, sources: &[u32], survivors: usize, sh_degree: u8) {
+        let Self { means, rotations, scales, opacities, sh, .. } = self;
+        let stride = 3 * sh::coefficients(sh_degree);
+        for (adam, width) in [(means, 3), (rotations, 4), (scales, 3), (opacities, 1), (sh, stride)] {
+            adam.follow(sources, survivors, width);
+        }
+    }
+
+    /// Opacities were set to something else.
+    pub(super) fn forget_opacities(&mut self) {
+        self.opacities.forget();
     }
 
     /// One step down `gradients`, which are of the Gaussians made of these parameters; `radius_m` is the scene's.

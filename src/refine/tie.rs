@@ -95,6 +95,14 @@ pub(super) fn gather(gradients: &mut Gradients, clones: &[Clone], n: usize, sh_d
     gradients.sh.truncate(n * stride);
 }
 
+/// The ties of Gaussians made of those in `sources`: who is made of one with a clone has one.
+pub(super) fn followed(clones: &[Clone], sources: &[u32], originals: usize) -> Vec<Clone> {
+    let mut gains: Vec<Option<[f32; 3]>> = vec![None; originals];
+    clones.iter().for_each(|clone| gains[clone.of as usize] = Some(clone.gain));
+    let tied = |(i, source): (usize, &u32)| gains[*source as usize].map(|gain| Clone { of: i as u32, gain });
+    sources.iter().enumerate().filter_map(tied).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -154,6 +162,17 @@ mod tests {
             let (clone, original) = (color(&all, 6)[c], color(&mirrored, 0)[c]);
             assert!(original <= 0.0 || (clone - gain * original).abs() < 1e-5, "{clone} {original}");
         }
+    }
+
+    #[test]
+    fn clones_come_and_go_with_their_originals() {
+        let expected = [
+            Clone { of: 0, gain: CLONES[2].gain },
+            Clone { of: 2, gain: CLONES[0].gain },
+            Clone { of: 3, gain: CLONES[0].gain },
+        ];
+        assert_eq!(followed(&CLONES, &[2, 3, 4, 4], 5), expected);
+        assert_eq!(followed(&CLONES, &[1, 3], 5), []);
     }
 
     #[test]

@@ -1,63 +1,82 @@
 //! One step, and a look at where it led.
 
-use super::parameters::{Optimizer, Rates};
+use super::densify::{self, Densified, Growth, Schedule, Seen};
+use super::parameters::{Optimizer, Parameters, Rates};
 use super::target::{Loss, Shown, Target};
-use super::tie::{self, Clone as Tied};
-use super::{RefineOptions, State};
+use super::{RefineOptions, State, tie};
 use crate::error::Result;
 use crate::gaussians::Gaussians;
 use crate::progress::Context;
 use crate::render::{Background, CpuRenderer, Gradients, PictureGradient, RenderOptions, Rendered};
 use crate::scene::View;
 
-/// Gradients of this size are noise of single pixels: a loss is a mean over all pixels.
-const NOISE: f32 = 1e-9;
+/// What is not the same for every way to optimise.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Measures {
+    /// Gradients of this size and below move a parameter by less than the rate.
+    pub(super) noise: f32,
+    /// Steps of centres are shares of it, and so are the sizes that density control goes by, metres.
+    pub(super) extent_m: f32,
+    /// What draws of density control depend on.
+    pub(super) seed: u64,
+}
 
 /// What one vehicle's refinement works with.
 pub(super) struct Work<'a> {
     views: &'a [View],
     targets: Vec<Target>,
-    clones: &'a [Tied],
     options: &'a RefineOptions,
+    measures: Measures,
     optimizer: Optimizer,
-    /// Steps of centres are shares of it.
-    radius_m: f32,
     renderer: CpuRenderer,
     render: RenderOptions,
+    /// What density control did.
+    densified: Densified,
     // Reused from step to step.
     gaussians: Gaussians,
     picture: Rendered,
     shown: Shown,
     of_picture: PictureGradient,
     gradients: Gradients,
+    seen: Seen,
+    /// Whether density control still wants to know.
+    watches: bool,
 }
 
 impl<'a> Work<'a> {
+    /// For steps from `state` on.
     pub(super) fn new(
-        originals: &Gaussians,
-        clones: &'a [Tied],
+        state: &State,
         views: &'a [View],
         options: &'a RefineOptions,
+        measures: Measures,
     ) -> Self {
-        let diagonal = |(low, high): ([f32; 3], [f32; 3])| {
-            (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f32>().sqrt()
-        };
+        let Parameters { sh_degree, .. } = state.parameters;
+        let mut seen = Seen::default();
+        seen.reset(state.parameters.len());
         Self {
             views,
             targets: views.iter().map(Target::of).collect(),
-            clones,
             options,
-            optimizer: Optimizer::new(originals.len(), originals.sh_degree(), NOISE),
-            radius_m: originals.bounds().map_or(1.0, |bounds| 0.5 * diagonal(bounds)).clamp(1e-3, 1e3),
+            measures,
+            optimizer: Optimizer::new(state.parameters.len(), sh_degree, measures.noise),
             renderer: CpuRenderer::new(),
             // Drawn on nothing, so that exposure acts on the vehicle alone.
             render: RenderOptions { background: Background::Transparent, ..RenderOptions::default() },
+            densified: Densified::default(),
             gaussians: Gaussians::default(),
             picture: Rendered::default(),
             shown: Shown::default(),
             of_picture: PictureGradient::default(),
             gradients: Gradients::default(),
+            seen,
+            watches: options.densify.is_some(),
         }
+    }
+
+    /// From now on colours have this SH degree; those above do nothing and stay as they are.
+    pub(super) fn show_degree(&mut self, sh_degree: u8) {
+        self.render.sh_degree = sh_degree;
     }
 
     /// One step by what `view` shows; the loss before it.
@@ -68,10 +87,10 @@ impl<'a> Work<'a> {
         rates: &Rates,
         context: &Context,
     ) -> Result<f64> {
-        let Self { views, targets, clones, options, optimizer, radius_m, renderer, render, .. } = self;
+        let Self { views, targets, options, measures, optimizer, renderer, render, seen, watches, .. } = self;
         let (gaussians, gradients) = (&mut self.gaussians, &mut self.gradients);
         let (picture, shown, of_picture) = (&mut self.picture, &mut self.shown, &mut self.of_picture);
-        let State { parameters, exposure } = state;
+        let State { parameters, clones, exposure } = state;
         context.parallel(|| {
             tie::made(parameters, clones, gaussians);
             let mut loss = Loss::default();
@@ -82,8 +101,11 @@ impl<'a> Work<'a> {
             let camera = &views[view].camera;
             let results = (picture, of_picture, &mut *gradients);
             renderer.render_with_gradients_into(gaussians, camera, render, results, of_loss)?;
+            if *watches {
+                seen.note(gaussians, gradients, camera, clones);
+            }
             tie::gather(gradients, clones, parameters.len(), parameters.sh_degree);
-            optimizer.step(parameters, gradients, rates, *radius_m);
+            optimizer.step(parameters, gradients, rates, measures.extent_m);
             if options.exposure {
                 exposure.step(view, loss.of_exposure, rates.exposure);
             }
@@ -91,10 +113,42 @@ impl<'a> Work<'a> {
         })
     }
 
+    /// Density control after `made` of `planned` steps, where it is wanted and due.
+    pub(super) fn densify(&mut self, state: &mut State, made: u32, planned: u32, context: &Context) {
+        let Some(rules) = &self.options.densify else { return };
+        let schedule = Schedule::of(planned);
+        self.watches = schedule.looks_at(made);
+        let State { parameters, clones, .. } = state;
+        if schedule.grows_at(made) {
+            let growth = context.parallel(|| {
+                let prunes_large = rules.resets && schedule.prunes_large_at(made);
+                let extent_m = self.measures.extent_m;
+                Growth::of(parameters, clones, &self.seen, rules, extent_m, prunes_large)
+            });
+            if let Some(growth) = growth {
+                *clones = tie::followed(clones, &growth.sources, parameters.len());
+                *parameters = growth.grown(parameters, [self.measures.seed, made.into()]);
+                self.optimizer.follow(&growth.sources, growth.survivors, parameters.sh_degree);
+                self.densified.add(&growth.done);
+            }
+            self.seen.reset(parameters.len());
+        }
+        if rules.resets && schedule.resets_at(made) {
+            densify::reset_opacities(parameters);
+            self.optimizer.forget_opacities();
+            self.densified.resets += 1;
+        }
+    }
+
+    /// What density control did, where it was wanted.
+    pub(super) fn densified(&self) -> Option<Densified> {
+        self.options.densify.map(|_| self.densified)
+    }
+
     /// Holds the surface where `state` has it; what [`Work::psnr_db`] of it says, and whether any view sees it.
     pub(super) fn begin(&mut self, state: &State, context: &Context) -> Result<(Vec<f64>, bool)> {
         context.parallel(|| {
-            tie::made(&state.parameters, self.clones, &mut self.gaussians);
+            tie::made(&state.parameters, &state.clones, &mut self.gaussians);
             let mut seen = false;
             let mut psnr_db = Vec::with_capacity(self.views.len());
             for view in 0..self.views.len() {
@@ -110,7 +164,7 @@ impl<'a> Work<'a> {
     /// PSNR of a view on white, in its exposure, dB.
     pub(super) fn psnr_of(&mut self, view: usize, state: &State, context: &Context) -> Result<f64> {
         context.parallel(|| {
-            tie::made(&state.parameters, self.clones, &mut self.gaussians);
+            tie::made(&state.parameters, &state.clones, &mut self.gaussians);
             self.psnr_drawn(view, state)
         })
     }
@@ -118,7 +172,7 @@ impl<'a> Work<'a> {
     /// The same of all views.
     pub(super) fn psnr_db(&mut self, state: &State, context: &Context) -> Result<Vec<f64>> {
         context.parallel(|| {
-            tie::made(&state.parameters, self.clones, &mut self.gaussians);
+            tie::made(&state.parameters, &state.clones, &mut self.gaussians);
             (0..self.views.len()).map(|view| self.psnr_drawn(view, state)).collect()
         })
     }
@@ -141,7 +195,7 @@ impl<'a> Work<'a> {
 
     /// The Gaussians of a state: originals, then clones.
     pub(super) fn finished(mut self, state: &State, context: &Context) -> Gaussians {
-        context.parallel(|| tie::made(&state.parameters, self.clones, &mut self.gaussians));
+        context.parallel(|| tie::made(&state.parameters, &state.clones, &mut self.gaussians));
         self.gaussians
     }
 }

@@ -108,6 +108,31 @@ fn depth_scale_replaces_the_scenes_unit() {
 }
 
 #[test]
+fn a_baseline_is_fitted_and_what_it_has_not_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let words = format!("reconstruct . --views {INPUTS} --resolution 0.25 --baseline 3dgs");
+    succeed(at, &format!("{words} --refine 4 -o {{}}/a.ply --report {{}}/r.json"));
+    let report = json(&at.join("r.json"));
+    assert_eq!((report["prior"].as_str(), report["head"].as_str()), (Some("none"), Some("3dgs")));
+    assert_eq!((report["refinement"]["made"].as_u64(), report["sh_degree"].as_u64()), (Some(4), Some(3)));
+    for option in [
+        "--symmetry always",
+        "--prior hull",
+        "--calibrate off",
+        "--depth-scale 1",
+        "--budget 3",
+        "--points {}/p.ply",
+        "--refine 4 --refine-hold-out",
+    ] {
+        let name =
+            option.split_whitespace().find(|word| *word != "--refine" && word.starts_with("--")).unwrap();
+        fail(at, &format!("{words} {option} -o {{}}/b.ply"), 2, &[name, "cannot be used with"]);
+    }
+    fail(at, &format!("{words}x -o {{}}/b.ply"), 2, &["3dgsx", "possible values: 3dgs"]);
+}
+
+#[test]
 fn a_refinement_is_reported_and_bad_amounts_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let made = vg_in(

@@ -77,6 +77,7 @@ pub(crate) fn reconstruct<'py>(
         threads,
         points,
         refine: refinement(py, refine_iterations, refine_seconds, refine_hold_out)?,
+        baseline: None,
     };
     // Before the pixels are copied.
     options.validate().map_err(|e| from_library(py, e))?;

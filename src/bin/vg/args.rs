@@ -5,7 +5,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
 use vg::onnx::{Model, ModelOptions, Provider};
 use vg::pipeline::{Calibrate, Keep, Options, PriorChoice};
-use vg::refine::{Amount, RefineOptions};
+use vg::refine::baseline::BaselineOptions;
+use vg::refine::{Amount, Densify, RefineOptions};
 use vg::relight::Relight;
 use vg::render::Background;
 use vg::symmetry::SymmetryMode;
@@ -71,9 +72,9 @@ pub(crate) struct MethodArgs {
     /// Length, width and height of the vehicle in metres, where known
     #[arg(long = "box", value_name = "L,W,H", value_parser = vehicle_size)]
     vehicle_size: Option<VehicleSize>,
-    /// Highest degree of the spherical harmonics that hold the colour
-    #[arg(long, value_name = "0..3", default_value_t = 2, value_parser = clap::value_parser!(u8).range(0..=3))]
-    sh_degree: u8,
+    /// Highest degree of the spherical harmonics that hold the colour [default: 2; of a baseline 3]
+    #[arg(long, value_name = "0..3", value_parser = clap::value_parser!(u8).range(0..=3))]
+    sh_degree: Option<u8>,
     /// Points measured on the vehicle, PLY in its frame, metres: a surface that is estimated is moved to them
     #[arg(long, value_name = "P.ply")]
     pub(crate) cloud: Option<PathBuf>,
@@ -95,6 +96,13 @@ pub(crate) struct MethodArgs {
     /// Keep one of three or more views out of the optimisation, to tell when to stop
     #[arg(long, requires = "refine")]
     refine_hold_out: bool,
+    /// Let Gaussians divide and go in the optimisation, as 3D Gaussian splatting does
+    #[arg(long, requires = "refine")]
+    refine_densify: bool,
+    /// Fit another method to the input views instead, for comparison: 3D Gaussian splatting from a random start or from
+    /// --cloud, without any prior; --refine tells how long (7000)
+    #[arg(long, value_enum, value_name = "METHOD", conflicts_with_all = NOT_OF_A_BASELINE)]
+    baseline: Option<Baseline>,
     /// Do not move the shape prior's surface to where the photographs agree
     #[arg(long)]
     no_photo: bool,
@@ -102,6 +110,24 @@ pub(crate) struct MethodArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) threads: usize,
 }
+
+/// Arguments of what a baseline has not.
+const NOT_OF_A_BASELINE: [&str; 14] = [
+    "prior",
+    "prior_model",
+    "head_model",
+    "onnxruntime",
+    "provider",
+    "symmetry",
+    "relight",
+    "calibrate",
+    "keep",
+    "budget",
+    "refine_hold_out",
+    "refine_densify",
+    "no_photo",
+    "depth_scale",
+];
 
 impl MethodArgs {
     /// For the library; models are opened.
@@ -158,7 +184,7 @@ impl MethodArgs {
                 Calibration::Off => Calibrate::Off,
             },
             vehicle_size: self.vehicle_size.map(|s| s.0),
-            sh_degree: self.sh_degree,
+            sh_degree: self.sh_degree.unwrap_or(Options::default().sh_degree),
             keep: Keep {
                 duplicate_views: kept(KeepItem::DuplicateViews),
                 overlap: kept(KeepItem::Overlap),
@@ -173,12 +199,26 @@ impl MethodArgs {
             max_views: self.max_views,
             threads: self.threads,
             points: false,
-            refine: self.refine.map(|amount| RefineOptions {
+            refine: self.refine.filter(|_| self.baseline.is_none()).map(|amount| RefineOptions {
                 amount,
                 hold_out: self.refine_hold_out,
+                densify: self.refine_densify.then(Densify::of_refinement),
                 ..RefineOptions::default()
             }),
+            baseline: self.baseline.map(|Baseline::GaussianSplatting| {
+                let default = BaselineOptions::default();
+                BaselineOptions {
+                    amount: self.refine.unwrap_or(default.amount),
+                    sh_degree: self.sh_degree.unwrap_or(default.sh_degree),
+                    ..default
+                }
+            }),
         }
+    }
+
+    /// Whether depth of the scene is read.
+    pub(crate) fn wants_depth(&self) -> bool {
+        matches!(self.prior, Prior::Auto | Prior::Given) && self.baseline.is_none()
     }
 }
 
@@ -225,7 +265,7 @@ pub(crate) struct ReconstructArgs {
     #[arg(short, long, value_name = "ASSET.ply")]
     pub(crate) output: PathBuf,
     /// Write the metric coloured point cloud as well
-    #[arg(long, value_name = "P.ply")]
+    #[arg(long, value_name = "P.ply", conflicts_with = "baseline")]
     pub(crate) points: Option<PathBuf>,
     /// Do not draw the model into the input views to report the error there: about twice as fast with given depth
     #[arg(long)]
@@ -359,6 +399,13 @@ enum Relit {
 enum Calibration {
     Auto,
     Off,
+}
+
+/// Methods to compare with.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Baseline {
+    #[value(name = "3dgs")]
+    GaussianSplatting,
 }
 
 /// The fields of [`Keep`].

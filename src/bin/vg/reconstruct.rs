@@ -1,6 +1,6 @@
 //! `vg reconstruct`: a scene in, a model out.
 
-use crate::args::{Prior, ReconstructArgs};
+use crate::args::ReconstructArgs;
 use crate::job::{Outcome, Result, note};
 use crate::shown::Bar;
 use crate::{cloud, files, scene, shown};
@@ -19,8 +19,7 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
         .cloned()
         .collect();
     // Depth that will not be used is not read either.
-    let load_depth = matches!(args.method.prior, Prior::Auto | Prior::Given);
-    let options = scene::options(&args.frame, args.depth.depth_scale, load_depth)?;
+    let options = scene::options(&args.frame, args.depth.depth_scale, args.method.wants_depth())?;
     let index = io::list_scene(&args.scene, &scene::named(args.views.views.as_deref(), &options))?;
     let read: Vec<_> = scene::files_of(&index)
         .into_iter()

@@ -8,9 +8,9 @@ use vg::progress::Progress;
 /// Steps of the bar per stage.
 const STEPS: u64 = 100;
 
-/// The stages in order, as a reconstruction reports them.
-const STAGES: [&str; 9] =
-    ["plan", "undistort", "calibrate", "prior", "pixels", "head", "symmetry", "refine", "check"];
+/// The stages in order, as a reconstruction reports them; no kind has all.
+const STAGES: [&str; 10] =
+    ["plan", "undistort", "calibrate", "prior", "pixels", "head", "symmetry", "start", "refine", "check"];
 
 /// A bar on standard error, where that is a terminal; else nothing.
 pub(crate) struct Bar(ProgressBar);

@@ -26,6 +26,8 @@ pub(crate) struct Measured {
     /// Means over the test views.
     #[serde(flatten)]
     pub(crate) errors: ViewErrors,
+    /// PSNR in the input views, dB.
+    pub(crate) input_psnr_db: Option<f64>,
     /// Depth error in the input views, metres, where they have depth that the method was not shown.
     pub(crate) input_depth_mae_m: Option<f64>,
     /// The 90th percentile there, metres, mean over the views.
@@ -92,7 +94,8 @@ pub(crate) fn split(from: &Shown, split: &Split, method: &Options, repeat: u32) 
 
 /// The views the method sees, with depth only where it is to use it.
 fn inputs(from: &Shown, split: &Split, method: &Options) -> Result<vg::Scene> {
-    let load_depth = matches!(method.prior, PriorChoice::Auto | PriorChoice::Given);
+    let load_depth =
+        matches!(method.prior, PriorChoice::Auto | PriorChoice::Given) && method.baseline.is_none();
     let options = SceneOptions { load_depth, ..from.options.clone() };
     let mut shown = scene::open(from.scene, &split.input, &options)?.scene;
     shown.cloud = match (from.cloud, from.cloud_points) {
@@ -117,6 +120,7 @@ pub(crate) fn judge(
     let measured = Measured {
         prior: made.report.prior.to_owned(),
         errors: ViewErrors::mean(&each).ok_or_else(none)?,
+        input_psnr_db: made.report.input_error.map(|error| error.psnr_db),
         input_depth_mae_m: None,
         input_depth_p90_m: None,
         reconstruct_ms: made.report.total_ms,
@@ -171,6 +175,7 @@ pub(crate) fn mean(all: &[&Measured]) -> Option<Measured> {
     Some(Measured {
         prior: if same_prior { all[0].prior.clone() } else { "mixed".into() },
         errors,
+        input_psnr_db: mean(all.iter().filter_map(|m| m.input_psnr_db).collect()),
         input_depth_mae_m: mean(all.iter().filter_map(|m| m.input_depth_mae_m).collect()),
         input_depth_p90_m: mean(all.iter().filter_map(|m| m.input_depth_p90_m).collect()),
         reconstruct_ms: of(|m| m.reconstruct_ms)?,

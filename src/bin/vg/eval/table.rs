@@ -3,7 +3,7 @@
 use super::measure::Measured;
 
 /// Heading of each column.
-const HEADINGS: [&str; 13] = [
+const HEADINGS: [&str; 14] = [
     "scene",
     "split",
     "prior",
@@ -12,6 +12,7 @@ const HEADINGS: [&str; 13] = [
     "PSNR box",
     "IoU",
     "depth MAE m",
+    "in. PSNR dB",
     "in. depth MAE m",
     "p90",
     "reconstruct s",
@@ -23,7 +24,7 @@ const HEADINGS: [&str; 13] = [
 const WORDS: usize = 3;
 
 /// Columns that are shown only where one of the rows has a number for them.
-const OPTIONAL: std::ops::Range<usize> = 8..10;
+const OPTIONAL: std::ops::Range<usize> = 8..11;
 
 /// What stands for no number.
 const NONE: &str = "-";
@@ -51,6 +52,7 @@ impl Table {
             number(m.errors.psnr_box_db, 3),
             number(Some(m.errors.silhouette_iou), 4),
             number(m.errors.depth_mae_m, 4),
+            number(m.input_psnr_db, 3),
             number(m.input_depth_mae_m, 4),
             number(m.input_depth_p90_m, 4),
             number(Some(m.reconstruct_ms / 1e3), 3),
