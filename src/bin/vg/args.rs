@@ -32,6 +32,8 @@ pub(crate) enum Command {
     Info(InfoArgs),
     /// Reconstruct from some views of scenes and measure the error in others
     Eval(EvalArgs),
+    /// Measure error against run time over a sweep of settings
+    Pareto(ParetoArgs),
     /// Run the whole job on the sample inside this program
     Demo(DemoArgs),
     /// Find the similarity from a scene's world to the vehicle's frame, from known camera centres
@@ -339,6 +341,43 @@ pub(crate) struct EvalArgs {
     #[arg(long, value_name = "R", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub(crate) repeat: u32,
     /// Write the numbers, per view too
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+}
+
+#[derive(Args)]
+pub(crate) struct ParetoArgs {
+    /// Scenes, as for `reconstruct`
+    #[arg(required = true)]
+    pub(crate) scenes: Vec<PathBuf>,
+    /// As for `eval`
+    #[arg(long, value_name = "FILE", default_value = "split.json")]
+    pub(crate) split: PathBuf,
+    /// This key of the split only
+    #[arg(long, value_name = "KEY")]
+    pub(crate) only: Option<String>,
+    /// A point of the sweep: options of `eval` that say how to reconstruct, "--refine 5s", with a name before a colon
+    /// if it is to have one; once for each point
+    #[arg(long = "point", value_name = "[NAME:] OPTIONS", required = true, allow_hyphen_values = true)]
+    pub(crate) points: Vec<String>,
+    /// Options that all points have
+    #[arg(long, value_name = "OPTIONS", default_value = "", allow_hyphen_values = true)]
+    pub(crate) with: String,
+    #[command(flatten)]
+    pub(crate) frame: FrameArgs,
+    /// Time each point R times, one after the other, and report the median and the spread
+    #[arg(long, value_name = "R", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) repeat: u32,
+    /// Write the table
+    #[arg(long, value_name = "FILE")]
+    pub(crate) csv: Option<PathBuf>,
+    /// Write a plot of PSNR against seconds
+    #[arg(long, value_name = "FILE")]
+    pub(crate) svg: Option<PathBuf>,
+    /// Heading of the plot
+    #[arg(long, value_name = "TEXT", default_value = "Error against run time")]
+    pub(crate) title: String,
+    /// Write all numbers
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
 }

@@ -12,6 +12,7 @@ mod eval;
 mod files;
 mod info;
 mod job;
+mod pareto;
 mod reconstruct;
 mod render;
 mod sample;
@@ -33,6 +34,7 @@ fn main() -> ExitCode {
         Command::Render(args) => render::run(args),
         Command::Info(args) => info::run(args),
         Command::Eval(args) => eval::run(args),
+        Command::Pareto(args) => pareto::run(args),
         Command::Demo(args) => demo::run(args),
         Command::Align(args) => align::run(args),
     };

@@ -28,6 +28,8 @@ pub(crate) struct Measured {
     pub(crate) errors: ViewErrors,
     /// PSNR in the input views, dB.
     pub(crate) input_psnr_db: Option<f64>,
+    /// SSIM there.
+    pub(crate) input_ssim: Option<f64>,
     /// Depth error in the input views, metres, where they have depth that the method was not shown.
     pub(crate) input_depth_mae_m: Option<f64>,
     /// The 90th percentile there, metres, mean over the views.
@@ -79,17 +81,23 @@ pub(crate) fn split(from: &Shown, split: &Split, method: &Options, repeat: u32) 
     let judged = scene::open(path, &split.test, &with_depth)?;
     let (_, mut measured) = judge(&made, &judged.scene.views, method.threads)?;
     measured.reconstruct_ms = median(&mut times);
+    // Opened again with depth, for this measure only: the prior has done its work without.
+    let judged = scene::open(path, &split.input, &with_depth)?;
+    let drawn = drawn(&made.gaussians, &judged.scene.views, method.threads)?.0;
+    let errors: Vec<_> = drawn.iter().zip(&judged.scene.views).map(|(d, v)| ViewErrors::of(d, v)).collect();
+    let mean = ViewErrors::mean(&errors);
+    measured.input_psnr_db = mean.map(|mean| mean.psnr_db);
+    measured.input_ssim = mean.and_then(|mean| mean.ssim);
     if made.report.prior != "given" {
-        // Opened again with depth, for this measure only: the prior has done its work without.
-        let judged = scene::open(path, &split.input, &with_depth)?;
-        let drawn = drawn(&made.gaussians, &judged.scene.views, method.threads)?.0;
-        let errors: Vec<_> =
-            drawn.iter().zip(&judged.scene.views).map(|(d, v)| ViewErrors::of(d, v)).collect();
-        let mean = ViewErrors::mean(&errors);
         measured.input_depth_mae_m = mean.and_then(|mean| mean.depth_mae_m);
         measured.input_depth_p90_m = mean.and_then(|mean| mean.depth_p90_m);
     }
     Ok(measured)
+}
+
+/// Milliseconds of one more reconstruction of the same.
+pub(crate) fn time(from: &Shown, split: &Split, method: &Options) -> Result<f64> {
+    Ok(reconstruct::reconstruct(&inputs(from, split, method)?, method)?.report.total_ms)
 }
 
 /// The views the method sees, with depth only where it is to use it.
@@ -121,6 +129,7 @@ pub(crate) fn judge(
         prior: made.report.prior.to_owned(),
         errors: ViewErrors::mean(&each).ok_or_else(none)?,
         input_psnr_db: made.report.input_error.map(|error| error.psnr_db),
+        input_ssim: None,
         input_depth_mae_m: None,
         input_depth_p90_m: None,
         reconstruct_ms: made.report.total_ms,
@@ -154,7 +163,7 @@ fn drawn(gaussians: &Gaussians, views: &[View], threads: usize) -> Result<(Vec<R
 }
 
 /// Of an even number of values the mean of the middle two; of none 0.
-fn median(values: &mut [f64]) -> f64 {
+pub(crate) fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     match values.len() {
         0 => 0.0,
@@ -176,6 +185,7 @@ pub(crate) fn mean(all: &[&Measured]) -> Option<Measured> {
         prior: if same_prior { all[0].prior.clone() } else { "mixed".into() },
         errors,
         input_psnr_db: mean(all.iter().filter_map(|m| m.input_psnr_db).collect()),
+        input_ssim: mean(all.iter().filter_map(|m| m.input_ssim).collect()),
         input_depth_mae_m: mean(all.iter().filter_map(|m| m.input_depth_mae_m).collect()),
         input_depth_p90_m: mean(all.iter().filter_map(|m| m.input_depth_p90_m).collect()),
         reconstruct_ms: of(|m| m.reconstruct_ms)?,

@@ -1,0 +1,171 @@
+//! The sweep as a picture: error against run time, SVG.
+
+use super::point::Row;
+use std::fmt::Write;
+
+const SIZE: [f64; 2] = [860.0, 520.0];
+/// Left, top, right, bottom.
+const MARGIN: [f64; 4] = [64.0, 48.0, 24.0, 56.0];
+const GREY: &str = "#6b7280";
+const FRONT: &str = "#1d4ed8";
+const BEHIND: &str = "#b45309";
+
+/// An axis: values to places on the picture.
+struct Axis {
+    low: f64,
+    high: f64,
+    from: f64,
+    to: f64,
+    /// Its logarithm is drawn.
+    is_log: bool,
+}
+
+impl Axis {
+    fn at(&self, value: f64) -> f64 {
+        let of = |v: f64| if self.is_log { v.log10() } else { v };
+        self.from + (of(value) - of(self.low)) / (of(self.high) - of(self.low)) * (self.to - self.from)
+    }
+
+    /// 1, 2 and 5 of each decade, or steps of such a number.
+    fn ticks(&self) -> Vec<f64> {
+        if self.is_log {
+            let decades = self.low.log10().floor() as i32..=self.high.log10().ceil() as i32;
+            let all = decades.flat_map(|d| [1.0, 2.0, 5.0].map(|m| m * 10f64.powi(d)));
+            return all.filter(|t| (self.low..=self.high).contains(t)).collect();
+        }
+        let rough = (self.high - self.low) / 6.0;
+        let decade = 10f64.powf(rough.log10().floor());
+        let step =
+            [1.0, 2.0, 5.0, 10.0].map(|m| m * decade).into_iter().find(|s| *s >= rough).unwrap_or(rough);
+        let (first, last) = ((self.low / step).ceil() as i64, (self.high / step).floor() as i64);
+        (first..=last).map(|k| k as f64 * step).collect()
+    }
+}
+
+/// PSNR of the test views against seconds, both with their spread; the front is joined.
+pub(super) fn svg(rows: &[Row], title: &str) -> String {
+    let [width, height] = SIZE;
+    let spread = |row: &Row| {
+        let (psnr, error) = (row.measured.errors.psnr_db, row.psnr_standard_error_db.unwrap_or(0.0));
+        [psnr - error, psnr + error]
+    };
+    let least = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::INFINITY, f64::min);
+    let most = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::NEG_INFINITY, f64::max);
+    let x = Axis {
+        low: least(&mut rows.iter().map(|r| r.seconds_range[0])).max(1e-4) / 1.3,
+        high: most(&mut rows.iter().map(|r| r.seconds_range[1])).max(1e-3) * 1.5,
+        from: MARGIN[0],
+        to: width - MARGIN[2],
+        is_log: true,
+    };
+    let y = Axis {
+        low: least(&mut rows.iter().map(|r| spread(r)[0])) - 0.15,
+        high: most(&mut rows.iter().map(|r| spread(r)[1])) + 0.15,
+        from: height - MARGIN[3],
+        to: MARGIN[1],
+        is_log: false,
+    };
+    let mut out = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
+         font-size=\"13\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n\
+         <text x=\"{}\" y=\"26\" font-size=\"16\">{}</text>\n",
+        MARGIN[0],
+        escaped(title)
+    );
+    grid(&mut out, &x, &y);
+
+    let mut front: Vec<&Row> = rows.iter().filter(|r| r.on_front).collect();
+    front.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
+    let places: Vec<String> = front
+        .iter()
+        .map(|r| format!("{:.1},{:.1}", x.at(r.seconds), y.at(r.measured.errors.psnr_db)))
+        .collect();
+    let _ = writeln!(
+        out,
+        "<polyline points=\"{}\" fill=\"none\" stroke=\"{FRONT}\" stroke-width=\"1.5\"/>",
+        places.join(" ")
+    );
+    for row in rows {
+        let color = if row.on_front { FRONT } else { BEHIND };
+        let (at_x, at_y) = (x.at(row.seconds), y.at(row.measured.errors.psnr_db));
+        let [y0, y1] = spread(row).map(|v| y.at(v));
+        let [x0, x1] = row.seconds_range.map(|v| x.at(v));
+        let _ = writeln!(
+            out,
+            "<path d=\"M{at_x:.1} {y0:.1}V{y1:.1}M{x0:.1} {at_y:.1}H{x1:.1}\" stroke=\"{color}\" \
+             stroke-opacity=\"0.4\"/>\n<circle cx=\"{at_x:.1}\" cy=\"{at_y:.1}\" r=\"4\" fill=\"{color}\"/>\n\
+             <text x=\"{:.1}\" y=\"{:.1}\" fill=\"{color}\">{}</text>",
+            at_x + 7.0,
+            at_y - 7.0,
+            escaped(&row.point)
+        );
+    }
+    out.push_str("</svg>\n");
+    out
+}
+
+fn grid(out: &mut String, x: &Axis, y: &Axis) {
+    for tick in x.ticks() {
+        let at = x.at(tick);
+        let _ = writeln!(
+            out,
+            "<path d=\"M{at:.1} {:.1}V{:.1}\" stroke=\"#e5e7eb\"/>\n\
+             <text x=\"{at:.1}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"{GREY}\">{tick}</text>",
+            y.from,
+            y.to,
+            y.from + 18.0
+        );
+    }
+    for tick in y.ticks() {
+        let at = y.at(tick);
+        let _ = writeln!(
+            out,
+            "<path d=\"M{:.1} {at:.1}H{:.1}\" stroke=\"#e5e7eb\"/>\n\
+             <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" fill=\"{GREY}\">{tick:.1}</text>",
+            x.from,
+            x.to,
+            x.from - 8.0,
+            at + 4.5
+        );
+    }
+    let _ = writeln!(
+        out,
+        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">seconds per reconstruction</text>\n\
+         <text transform=\"translate(18 {:.1}) rotate(-90)\" text-anchor=\"middle\">PSNR of the test views, dB</text>",
+        0.5 * (x.from + x.to),
+        y.from + 42.0,
+        0.5 * (y.from + y.to)
+    );
+}
+
+/// For XML; what a terminal would take for a command is left out.
+fn escaped(text: &str) -> String {
+    let one = |c: char| match c {
+        '&' => "&amp;".into(),
+        '<' => "&lt;".into(),
+        '>' => "&gt;".into(),
+        c if c.is_control() => String::new(),
+        c => c.to_string(),
+    };
+    text.chars().map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_numbers_inside_the_axis() {
+        let x = Axis { low: 0.3, high: 40.0, from: 0.0, to: 100.0, is_log: true };
+        assert_eq!(x.ticks(), [0.5, 1.0, 2.0, 5.0, 10.0, 20.0]);
+        assert!(x.at(0.3).abs() < 1e-9 && (x.at(40.0) - 100.0).abs() < 1e-9);
+        let y = Axis { low: 21.93, high: 24.1, from: 10.0, to: 0.0, is_log: false };
+        assert_eq!(y.ticks().len(), 4);
+        assert!((y.ticks()[0] - 22.0).abs() < 1e-9 && (y.at(21.93) - 10.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn names_cannot_break_the_picture() {
+        assert_eq!(escaped("a<b>&\u{1b}\n"), "a&lt;b&gt;&amp;");
+    }
+}
