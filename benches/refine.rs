@@ -1,0 +1,450 @@
+//! Time of a step of refinement, beside OpenSplat's CPU renderer in the same run.
+//!
+//! ```text
+//! cargo bench --bench refine                                              the library alone
+//! cargo bench --bench refine -- --opensplat CHECKOUT --python PYTHON      both, in turns
+//! ```
+//!
+//! CHECKOUT is one of OpenSplat's repository (AGPL; nothing of it is here), PYTHON one with PyTorch, NumPy and ninja,
+//! and a C++ compiler is needed: the first run builds an extension, which takes minutes.
+//!
+//! Both have the same Gaussians, cameras, targets and loss (0.8 L1 + 0.2 (1 - SSIM) of colour on black, without the five
+//! pixels at the rim), the same rates of Adam, and two threads. A step is what both do: draw one view, take the
+//! gradient of every parameter, move every parameter by Adam. The library's own steps have two more terms of loss and
+//! exposures; OpenSplat's keep gradients of splat centres, and move SH bands above 0 once in 16 steps.
+
+#[allow(unused_imports)] // of its tests, which are not here
+#[path = "../src/refine/adam.rs"]
+mod adam; // what the library itself moves parameters by
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use adam::Adam;
+use common::timing::cpu_time;
+use common::{Random, scenes};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::fs::{read, write};
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::time::{Duration, Instant};
+use vg::refine::{Rates, RefineOptions};
+use vg::render::loss::{self, Term};
+use vg::render::{Background, CpuRenderer, Gradients, PictureGradient, RenderOptions, Rendered, Renderer};
+use vg::{Camera, Error, Gaussians, Result, io};
+
+const GAUSSIANS: usize = 100_000;
+const SIZE: [u32; 2] = [512, 384];
+const THREADS: usize = 2;
+const BLOCKS: usize = 3;
+/// Of each block and kind of work, one step by each view.
+const ROUNDS: usize = 3;
+/// Weight of 1 - SSIM beside that of L1; the other program has it as well.
+const SSIM: f64 = 0.2;
+/// Adam's epsilon.
+const NOISE: f32 = 1e-9;
+/// OpenSplat's loss leaves out the pixels whose SSIM window is cut.
+const RIM: u32 = 5;
+
+/// What is timed.
+#[derive(Clone, Copy)]
+enum Work {
+    /// A picture, its loss, and all gradients.
+    Gradients,
+    /// And a step; the other program's is by the optimiser that OpenSplat uses.
+    Step,
+    /// The same, by the fastest optimiser of the other program.
+    FusedStep,
+}
+
+fn main() -> Result<()> {
+    let words: Vec<String> = std::env::args().skip(1).filter(|w| w != "--bench").collect();
+    let after = |name: &str| words.iter().position(|w| w == name).and_then(|i| words.get(i + 1));
+    let mut ours = Ours::new()?;
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut theirs = match (after("--opensplat"), after("--python")) {
+        (Some(checkout), Some(python)) => Some(Theirs::start(python, checkout, folder.path(), &ours)?),
+        _ => None,
+    };
+    println!(
+        "{GAUSSIANS} Gaussians, SH degree 3, {} views of {}x{}, {THREADS} threads each, {}",
+        ours.cameras.len(),
+        SIZE[0],
+        SIZE[1],
+        ours.renderer.level()
+    );
+    if let Some(theirs) = &mut theirs {
+        compare(&mut ours, theirs, folder.path())?;
+    }
+
+    println!(
+        "ms for one view: median (least to most) of {BLOCKS} blocks of {ROUNDS} rounds in turns, each a step by every view\n"
+    );
+    println!("| | vg | CPU | OpenSplat | CPU | OpenSplat / vg | CPU |");
+    println!("| --- | --- | --- | --- | --- | --- | --- |");
+    let all = [
+        ("picture, loss, gradients", Work::Gradients),
+        ("a step, its optimiser", Work::Step),
+        ("a step, libtorch's fused Adam", Work::FusedStep),
+    ];
+    // A block of each in turn, so that what else the machine does meets all of them.
+    let mut times = vec![(Vec::new(), Vec::new()); all.len()];
+    for _ in 0..BLOCKS {
+        for ((_, work), (here, there)) in all.iter().zip(&mut times) {
+            block(*work, &mut ours, theirs.as_mut(), here, there)?;
+        }
+    }
+    for ((name, _), (here, there)) in all.iter().zip(&times) {
+        if there.is_empty() {
+            println!("| {name} | {} | {} | | | | |", shown(here, 0), middle(here, 1));
+            continue;
+        }
+        let ratios: Vec<_> = here.iter().zip(there).map(|(a, b)| [b[0] / a[0], b[1] / a[1]]).collect();
+        println!(
+            "| {name} | {} | {} | {} | {} | {} | {} |",
+            shown(here, 0),
+            middle(here, 1),
+            shown(there, 0),
+            middle(there, 1),
+            shown(&ratios, 0),
+            middle(&ratios, 1)
+        );
+    }
+    let share = |d: Duration| 1e3 * d.as_secs_f64() / f64::from(ours.drawn);
+    println!("\nvg's loss and its gradient are {:.1} ms of each", share(ours.in_loss));
+    Ok(())
+}
+
+/// Rounds in turns, after one of each that is not timed; adds wall and processor ms of one view.
+fn block(
+    work: Work,
+    ours: &mut Ours,
+    mut theirs: Option<&mut Theirs>,
+    here: &mut Vec<[f64; 2]>,
+    there: &mut Vec<[f64; 2]>,
+) -> Result<()> {
+    /// A thread that spins before it sleeps is not to take the other program's time.
+    const PAUSE: Duration = Duration::from_millis(50);
+    ours.reset();
+    if let Some(theirs) = &mut theirs {
+        theirs.ask("reset")?;
+    }
+    let per_view = 1e3 / ours.cameras.len() as f64;
+    for round in 0..=ROUNDS {
+        std::thread::sleep(PAUSE);
+        let row = ours.round(work)?;
+        if round > 0 {
+            here.push(row.map(|s| s * per_view));
+        }
+        std::thread::sleep(PAUSE);
+        let Some(theirs) = &mut theirs else { continue };
+        let row = theirs.ask(match work {
+            Work::Gradients => "gradients",
+            Work::Step => "step",
+            Work::FusedStep => "fused_step",
+        })?;
+        if round > 0 {
+            there.push(row.map(|s| s * per_view));
+        }
+    }
+    Ok(())
+}
+
+/// How far the two pictures of the first view and their gradients of means are from one another.
+fn compare(ours: &mut Ours, theirs: &mut Theirs, folder: &Path) -> Result<()> {
+    let [loss, _] = theirs.ask("look")?;
+    let numbers = |name: &str| -> Vec<f32> {
+        let bytes = read(folder.join(name)).expect("what was written");
+        bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().expect("four"))).collect()
+    };
+    let here = ours.descend(0)?;
+    let picture = numbers("picture.f32");
+    let colors = ours.picture.color.as_flattened().iter().zip(&picture);
+    let off = common::difference(colors.map(|(a, b)| (a.min(1.0).into(), (*b).into())));
+    println!("loss {here:.6} and {loss:.6}; pictures differ by {:.1e}, at most {:.1e}", off.mean, off.max);
+    let apart = |name: &str| {
+        let there = numbers(name);
+        let pairs = ours.gradients.means.as_flattened().iter().zip(&there);
+        let off: f64 = pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum();
+        (off / there.iter().map(|b| f64::from(*b).powi(2)).sum::<f64>()).sqrt()
+    };
+    println!(
+        "gradients of means differ by {:.1e} of their norm; by {:.1e} where OpenSplat's colour turns with its centre\n",
+        apart("means.f32"),
+        apart("means_turning.f32")
+    );
+    Ok(())
+}
+
+/// The library's side.
+struct Ours {
+    pool: rayon::ThreadPool,
+    renderer: CpuRenderer,
+    options: RenderOptions,
+    rates: Rates,
+    cameras: Vec<Camera>,
+    /// `[view][height * width]`
+    targets: Vec<Vec<[f32; 3]>>,
+    /// 1 where the loss looks, 0 at the rim. `[height * width]`
+    inside: Vec<f32>,
+    start: Gaussians,
+    // Written by steps.
+    gaussians: Gaussians,
+    parameters: Parameters,
+    picture: Rendered,
+    of_picture: PictureGradient,
+    gradients: Gradients,
+    in_loss: Duration,
+    drawn: u32,
+}
+
+impl Ours {
+    fn new() -> Result<Self> {
+        let start = scenes::surfel_car(GAUSSIANS);
+        // OpenSplat's constants.
+        let options = RenderOptions {
+            background: Background::Color([0.0; 3]),
+            max_alpha: 0.999,
+            ..RenderOptions::default()
+        };
+        let around = [[0.75, -0.55], [-0.6, -0.7], [-0.75, 0.55], [0.6, 0.7]];
+        let [width, height] = SIZE;
+        let camera = |[x, y]: [f64; 2]| scenes::looking_at_origin(width, height, DVec3::new(x, y, 0.36), 8.0);
+        let cameras = around.map(camera).to_vec();
+        let (renderer, shown) = (CpuRenderer::new(), perturbed(&start));
+        let target = |camera| {
+            let color = renderer.render(&shown, camera, &options)?.color;
+            Ok(color.into_iter().map(|c| c.map(|v| v.min(1.0))).collect())
+        };
+        let targets = cameras.iter().map(target).collect::<Result<_>>()?;
+        let inner = |i: u32, size: u32| i >= RIM && i + RIM < size;
+        let pixels = (0..height).flat_map(|v| (0..width).map(move |u| (u, v)));
+        let inside = pixels.map(|(u, v)| f32::from(u8::from(inner(u, width) && inner(v, height)))).collect();
+        let rates = RefineOptions::default().rates;
+        Ok(Self {
+            pool: rayon::ThreadPoolBuilder::new().num_threads(THREADS).build().expect("threads"),
+            renderer,
+            options,
+            // Of centres in metres.
+            rates: Rates { means: rates.means * radius_m(&start), ..rates },
+            cameras,
+            targets,
+            inside,
+            gaussians: start.clone(),
+            parameters: Parameters::of(&start),
+            start,
+            picture: Rendered::default(),
+            of_picture: PictureGradient::default(),
+            gradients: Gradients::default(),
+            in_loss: Duration::ZERO,
+            drawn: 0,
+        })
+    }
+
+    fn reset(&mut self) {
+        self.gaussians = self.start.clone();
+        self.parameters = Parameters::of(&self.start);
+    }
+
+    /// Wall and processor seconds of one step by each view.
+    fn round(&mut self, work: Work) -> Result<[f64; 2]> {
+        let (wall, cpu) = (Instant::now(), cpu_time());
+        for view in 0..self.cameras.len() {
+            self.descend(view)?;
+            if let Work::Step | Work::FusedStep = work {
+                let Self { pool, parameters, gradients, rates, .. } = self;
+                self.gaussians = pool.install(|| {
+                    parameters.step(gradients, rates);
+                    parameters.made()
+                })?;
+            }
+        }
+        Ok([wall.elapsed().as_secs_f64(), (cpu_time() - cpu).as_secs_f64()])
+    }
+
+    /// A picture, and the gradients of its loss, which it returns.
+    fn descend(&mut self, view: usize) -> Result<f64> {
+        let Self { pool, renderer, gaussians, options, cameras, targets, inside, .. } = self;
+        let results = (&mut self.picture, &mut self.of_picture, &mut self.gradients);
+        let mut value = 0.0;
+        let of_loss = |picture: &Rendered, gradient: &mut PictureGradient| {
+            let on = |weight| Term::weighing(weight).on(inside);
+            value += loss::l1(picture, &targets[view], on(1.0 - SSIM), gradient)?;
+            value += loss::dissimilarity(picture, &targets[view], on(SSIM), gradient)?;
+            Ok(())
+        };
+        let times = pool.install(|| {
+            renderer.render_with_gradients_into(gaussians, &cameras[view], options, results, of_loss)
+        })?;
+        self.in_loss += times.loss;
+        self.drawn += 1;
+        Ok(value)
+    }
+}
+
+/// Half the diagonal of the box around all centres, metres.
+fn radius_m(gaussians: &Gaussians) -> f32 {
+    let (low, high) = gaussians.bounds().expect("some");
+    0.5 * (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f32>().sqrt()
+}
+
+/// The same vehicle, a little different everywhere: what the photographs show.
+fn perturbed(g: &Gaussians) -> Gaussians {
+    let mut r = Random::new(5);
+    let mut by = |v: f32, sigma: f64| v + (sigma * r.normal()) as f32;
+    Gaussians::from_arrays(
+        g.sh_degree(),
+        g.means().iter().map(|m| m.map(|v| by(v, 0.004))).collect(),
+        g.rotations().to_vec(),
+        g.scales().iter().map(|s| s.map(|v| v * by(0.0, 0.1).exp())).collect(),
+        g.opacities().iter().map(|&o| by(o, 0.05).clamp(0.05, 0.99)).collect(),
+        g.sh().iter().map(|&v| by(v, 0.03)).collect(),
+    )
+    .expect("storable")
+}
+
+/// What Adam moves, each in the space in which it may have any value.
+struct Parameters {
+    sh_degree: u8,
+    means: Vec<[f32; 3]>,
+    rotations: Vec<[f32; 4]>,
+    log_scales: Vec<[f32; 3]>,
+    logits: Vec<f32>,
+    sh: Vec<f32>,
+    /// Of means, rotations, scales, opacities and colours.
+    adams: [Adam; 5],
+    gradient: Vec<f32>,
+}
+
+impl Parameters {
+    fn of(g: &Gaussians) -> Self {
+        let n = g.len();
+        Self {
+            sh_degree: g.sh_degree(),
+            means: g.means().to_vec(),
+            rotations: g.rotations().to_vec(),
+            log_scales: g.scales().iter().map(|s| s.map(f32::ln)).collect(),
+            logits: g.opacities().iter().map(|o| (o / (1.0 - o)).ln()).collect(),
+            sh: g.sh().to_vec(),
+            adams: [3 * n, 4 * n, 3 * n, n, g.sh().len()].map(|len| Adam::new(len, NOISE)),
+            gradient: Vec::new(),
+        }
+    }
+
+    fn step(&mut self, of: &Gradients, rates: &Rates) {
+        let [means, rotations, scales, opacities, sh] = &mut self.adams;
+        means.step(self.means.as_flattened_mut(), of.means.as_flattened(), |_| rates.means);
+        rotations.step(self.rotations.as_flattened_mut(), of.rotations.as_flattened(), |_| rates.rotations);
+        let log_scales = self.log_scales.as_flattened_mut();
+        let of_log = |(s, g): (&f32, &f32)| s.exp() * g;
+        self.gradient.clear();
+        self.gradient.par_extend(log_scales.par_iter().zip(of.scales.as_flattened()).map(of_log));
+        scales.step(log_scales, &self.gradient, |_| rates.scales);
+        let of_logit = |(x, g): (&f32, &f32)| sigmoid(*x) * sigmoid(-x) * g;
+        self.gradient.clear();
+        self.gradient.par_extend(self.logits.par_iter().zip(&of.opacities).map(of_logit));
+        opacities.step(&mut self.logits, &self.gradient, |_| rates.opacities);
+        let stride = self.sh.len() / self.logits.len();
+        let rate = |k: usize| if k % stride < 3 { rates.colors } else { rates.view_dependence };
+        sh.step(&mut self.sh, &of.sh, rate);
+    }
+
+    /// Through the door that checks every number; the library's own refinement, which keeps what it checks, writes over
+    /// the Gaussians of the step before.
+    fn made(&self) -> Result<Gaussians> {
+        Gaussians::from_arrays(
+            self.sh_degree,
+            self.means.clone(),
+            self.rotations.clone(),
+            self.log_scales.par_iter().map(|s| s.map(f32::exp)).collect(),
+            self.logits.par_iter().map(|x| sigmoid(*x)).collect(),
+            self.sh.clone(),
+        )
+    }
+}
+
+fn sigmoid(x: f32) -> f32 {
+    1.0 / (1.0 + (-x).exp())
+}
+
+/// The other program, which answers a line with a line.
+struct Theirs {
+    child: Child,
+    ask: Option<ChildStdin>,
+    answers: BufReader<ChildStdout>,
+}
+
+impl Theirs {
+    fn start(python: &str, checkout: &str, folder: &Path, ours: &Ours) -> Result<Self> {
+        let camera_from_vehicle = |camera: &Camera| {
+            let m = camera.vehicle_from_camera.inverse().to_row_major();
+            [&m[..4], &m[4..8], &m[8..], &[0.0, 0.0, 0.0, 1.0]].map(<[f64]>::to_vec)
+        };
+        let intrinsics = |camera: &Camera| {
+            let k = camera.intrinsics;
+            [k.fx, k.fy, k.cx, k.cy]
+        };
+        let Rates { means, rotations, scales, opacities, colors, view_dependence, .. } = ours.rates;
+        let job = serde_json::json!({
+            "size": SIZE,
+            "cameras": ours.cameras.iter().map(camera_from_vehicle).collect::<Vec<_>>(),
+            "intrinsics": ours.cameras.iter().map(intrinsics).collect::<Vec<_>>(),
+            "rates": [means, scales, rotations, opacities, colors, view_dependence],
+            "noise": NOISE,
+        });
+        let targets: Vec<u8> =
+            ours.targets.iter().flat_map(|t| t.as_flattened()).flat_map(|v| v.to_le_bytes()).collect();
+        io::ply::write(&folder.join("start.ply"), &ours.start)?;
+        write(folder.join("job.json"), job.to_string()).expect("a file");
+        write(folder.join("targets.f32"), targets).expect("a file");
+        let program = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/peers/opensplat.py");
+        let mut child = Command::new(python)
+            .arg(program)
+            .arg(checkout)
+            .arg(folder)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .map_err(|e| failed(&e))?;
+        let ask = child.stdin.take();
+        let answers = BufReader::new(child.stdout.take().expect("a pipe"));
+        Ok(Self { child, ask, answers })
+    }
+
+    /// The two numbers it answers.
+    fn ask(&mut self, word: &str) -> Result<[f64; 2]> {
+        let mut line = String::new();
+        let ask = self.ask.as_mut().expect("a pipe");
+        writeln!(ask, "{word}").and_then(|()| self.answers.read_line(&mut line)).map_err(|e| failed(&e))?;
+        let numbers: Vec<f64> = line.split_whitespace().filter_map(|w| w.parse().ok()).collect();
+        numbers.try_into().map_err(|_| Error::argument("PYTHON", format!("{line:?}"), "two numbers"))
+    }
+}
+
+impl Drop for Theirs {
+    fn drop(&mut self) {
+        // The end of its input is the end of it.
+        self.ask = None;
+        let _ = self.child.wait();
+    }
+}
+
+fn failed(e: &std::io::Error) -> Error {
+    Error::argument("PYTHON", e.to_string(), "one with torch, numpy and ninja")
+}
+
+fn sorted(rows: &[[f64; 2]], column: usize) -> Vec<f64> {
+    let mut values: Vec<f64> = rows.iter().map(|row| row[column]).collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+fn middle(rows: &[[f64; 2]], column: usize) -> String {
+    format!("{:.1}", sorted(rows, column)[rows.len() / 2])
+}
+
+fn shown(rows: &[[f64; 2]], column: usize) -> String {
+    let values = sorted(rows, column);
+    format!("{} ({:.1} to {:.1})", middle(rows, column), values[0], values[values.len() - 1])
+}
