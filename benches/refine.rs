@@ -13,7 +13,7 @@
 //! gradient of every parameter, move every parameter by Adam. The library's own steps have two more terms of loss and
 //! exposures; OpenSplat's keep gradients of splat centres, and move SH bands above 0 once in 16 steps.
 
-#[allow(unused_imports)] // of its tests, which are not here
+#[allow(dead_code, unused_imports)] // of density control and of its tests, which are not here
 #[path = "../src/refine/adam.rs"]
 mod adam; // what the library itself moves parameters by
 #[path = "../tests/common/mod.rs"]
@@ -30,7 +30,7 @@ use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 use vg::refine::{Rates, RefineOptions};
-use vg::render::loss::{self, Term};
+use vg::render::loss::{self, Structure, Term};
 use vg::render::{Background, CpuRenderer, Gradients, PictureGradient, RenderOptions, Rendered, Renderer};
 use vg::{Camera, Error, Gaussians, Result, io};
 
@@ -186,6 +186,8 @@ struct Ours {
     cameras: Vec<Camera>,
     /// `[view][height * width]`
     targets: Vec<Vec<[f32; 3]>>,
+    /// The same for SSIM.
+    structures: Vec<Structure>,
     /// 1 where the loss looks, 0 at the rim. `[height * width]`
     inside: Vec<f32>,
     start: Gaussians,
@@ -217,10 +219,12 @@ impl Ours {
             let color = renderer.render(&shown, camera, &options)?.color;
             Ok(color.into_iter().map(|c| c.map(|v| v.min(1.0))).collect())
         };
-        let targets = cameras.iter().map(target).collect::<Result<_>>()?;
+        let targets: Vec<Vec<[f32; 3]>> = cameras.iter().map(target).collect::<Result<_>>()?;
         let inner = |i: u32, size: u32| i >= RIM && i + RIM < size;
         let pixels = (0..height).flat_map(|v| (0..width).map(move |u| (u, v)));
-        let inside = pixels.map(|(u, v)| f32::from(u8::from(inner(u, width) && inner(v, height)))).collect();
+        let inside: Vec<f32> =
+            pixels.map(|(u, v)| f32::from(u8::from(inner(u, width) && inner(v, height)))).collect();
+        let structures = targets.iter().map(|target| Structure::new(target, SIZE, Some(inside.clone())));
         let rates = RefineOptions::default().rates;
         Ok(Self {
             pool: rayon::ThreadPoolBuilder::new().num_threads(THREADS).build().expect("threads"),
@@ -229,6 +233,7 @@ impl Ours {
             // Of centres in metres.
             rates: Rates { means: rates.means * radius_m(&start), ..rates },
             cameras,
+            structures: structures.collect::<Result<_>>()?,
             targets,
             inside,
             gaussians: start.clone(),
@@ -265,13 +270,12 @@ impl Ours {
 
     /// A picture, and the gradients of its loss, which it returns.
     fn descend(&mut self, view: usize) -> Result<f64> {
-        let Self { pool, renderer, gaussians, options, cameras, targets, inside, .. } = self;
+        let Self { pool, renderer, gaussians, options, cameras, targets, structures, inside, .. } = self;
         let results = (&mut self.picture, &mut self.of_picture, &mut self.gradients);
         let mut value = 0.0;
         let of_loss = |picture: &Rendered, gradient: &mut PictureGradient| {
-            let on = |weight| Term::weighing(weight).on(inside);
-            value += loss::l1(picture, &targets[view], on(1.0 - SSIM), gradient)?;
-            value += loss::dissimilarity(picture, &targets[view], on(SSIM), gradient)?;
+            value += loss::l1(picture, &targets[view], Term::weighing(1.0 - SSIM).on(inside), gradient)?;
+            value += structures[view].dissimilarity(picture, SSIM, gradient)?;
             Ok(())
         };
         let times = pool.install(|| {
@@ -334,20 +338,20 @@ impl Parameters {
 
     fn step(&mut self, of: &Gradients, rates: &Rates) {
         let [means, rotations, scales, opacities, sh] = &mut self.adams;
-        means.step(self.means.as_flattened_mut(), of.means.as_flattened(), |_| rates.means);
-        rotations.step(self.rotations.as_flattened_mut(), of.rotations.as_flattened(), |_| rates.rotations);
+        means.step(self.means.as_flattened_mut(), of.means.as_flattened(), &[rates.means]);
+        rotations.step(self.rotations.as_flattened_mut(), of.rotations.as_flattened(), &[rates.rotations]);
         let log_scales = self.log_scales.as_flattened_mut();
         let of_log = |(s, g): (&f32, &f32)| s.exp() * g;
         self.gradient.clear();
         self.gradient.par_extend(log_scales.par_iter().zip(of.scales.as_flattened()).map(of_log));
-        scales.step(log_scales, &self.gradient, |_| rates.scales);
+        scales.step(log_scales, &self.gradient, &[rates.scales]);
         let of_logit = |(x, g): (&f32, &f32)| sigmoid(*x) * sigmoid(-x) * g;
         self.gradient.clear();
         self.gradient.par_extend(self.logits.par_iter().zip(&of.opacities).map(of_logit));
-        opacities.step(&mut self.logits, &self.gradient, |_| rates.opacities);
+        opacities.step(&mut self.logits, &self.gradient, &[rates.opacities]);
         let stride = self.sh.len() / self.logits.len();
-        let rate = |k: usize| if k % stride < 3 { rates.colors } else { rates.view_dependence };
-        sh.step(&mut self.sh, &of.sh, rate);
+        let rate = |k: usize| if k < 3 { rates.colors } else { rates.view_dependence };
+        sh.step(&mut self.sh, &of.sh, &(0..stride).map(rate).collect::<Vec<f32>>());
     }
 
     /// Through the door that checks every number; the library's own refinement, which keeps what it checks, writes over
