@@ -94,7 +94,7 @@ fn who_divides_keeps_a_mirror_image() {
     let made = of(2);
     assert!(made.gaussians == of(3).gaussians);
     let done = made.report.refinement.as_ref().unwrap().densified.unwrap();
-    assert!(done.cloned > 0 && done.resets == 0, "{done:?}");
+    assert!(done.split > 0 && done.resets == 0, "{done:?}");
     let (g, n) = (&made.gaussians, made.gaussians.len() / 2);
     assert!(g.len() <= 9_000 && g.len() > made.report.symmetry.cloned, "{}", g.len());
     for i in 0..n {

@@ -102,7 +102,7 @@ pub(crate) struct MethodArgs {
     #[arg(long, requires = "refine")]
     refine_densify: bool,
     /// Fit another method to the input views instead, for comparison: 3D Gaussian splatting from a random start or from
-    /// --cloud, without any prior; --refine tells how long (7000)
+    /// --cloud, without any prior; --refine tells how long (2000)
     #[arg(long, value_enum, value_name = "METHOD", conflicts_with_all = NOT_OF_A_BASELINE)]
     baseline: Option<Baseline>,
     /// Do not move the shape prior's surface to where the photographs agree

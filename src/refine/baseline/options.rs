@@ -6,7 +6,8 @@ use crate::error::{Error, Result};
 use crate::gaussians::sh;
 use serde::Serialize;
 
-/// Settings of 3D Gaussian splatting as a baseline; the defaults are the original's.
+/// Settings of 3D Gaussian splatting as a baseline; the defaults are the original's but for the length, which
+/// docs/BASELINE.md gives the reason of.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BaselineOptions {
     /// How long. The first steps tell how many fit into seconds; later ones take longer where Gaussians become many.
@@ -30,7 +31,7 @@ pub struct BaselineOptions {
 impl Default for BaselineOptions {
     fn default() -> Self {
         Self {
-            amount: Amount::Iterations(7_000),
+            amount: Amount::Iterations(2_000),
             points: 100_000,
             sh_degree: 3,
             rates: Rates {

@@ -39,7 +39,7 @@ impl Default for Densify {
 }
 
 impl Densify {
-    /// For a model that is good already: what was made opaque stays so.
+    /// For a model that is good already and a few hundred steps, in which opacities that were reset do not come back.
     pub fn of_refinement() -> Self {
         Self { resets: false, ..Self::default() }
     }
