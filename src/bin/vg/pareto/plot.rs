@@ -160,7 +160,7 @@ mod tests {
         assert_eq!(x.ticks(), [0.5, 1.0, 2.0, 5.0, 10.0, 20.0]);
         assert!(x.at(0.3).abs() < 1e-9 && (x.at(40.0) - 100.0).abs() < 1e-9);
         let y = Axis { low: 21.93, high: 24.1, from: 10.0, to: 0.0, is_log: false };
-        assert_eq!(y.ticks().len(), 4);
+        assert_eq!(y.ticks().len(), 5);
         assert!((y.ticks()[0] - 22.0).abs() < 1e-9 && (y.at(21.93) - 10.0).abs() < 1e-9);
     }
 
