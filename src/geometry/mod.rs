@@ -10,6 +10,7 @@ pub mod align;
 pub mod camera;
 pub mod distortion;
 pub mod frame;
+pub(crate) mod nearest;
 pub mod pose;
 pub(crate) mod unfolded;
 

@@ -5,8 +5,8 @@
 //! original's; pixels of which nothing is known count for nothing. One view a step, in a new order each round. All
 //! numbers are the original's for 30,000 steps; in a shorter run its schedule is shorter by the same factor.
 
-mod nearest;
 mod options;
+mod spacing;
 mod start;
 
 pub use options::BaselineOptions;

@@ -2,7 +2,7 @@
 
 use super::super::chance::{Chance, shuffled};
 use super::BaselineOptions;
-use super::nearest::spacing;
+use super::spacing::spacing;
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
 use crate::gaussians::buffer::Gaussian;
