@@ -12,6 +12,7 @@ pub mod image;
 mod json;
 mod listing;
 mod load;
+mod masked;
 mod npy;
 mod pfm;
 pub mod ply;
@@ -21,6 +22,7 @@ pub mod transforms;
 pub mod vehicle_frame;
 
 pub use files::write_atomically;
+pub use masked::{MaskedViews, read_masked};
 pub use scene::{
     NamedCamera, SceneFiles, SceneFormat, SceneIndex, SceneOptions, SceneView, list_scene, open_scene,
 };
