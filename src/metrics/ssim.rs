@@ -249,7 +249,7 @@ fn clamped(pixel: &[f32; 3], c: usize) -> f64 {
 
 /// The window's weights in one direction: exp(-(i - 5)^2 / (2 1.5^2)), divided by their sum.
 const KERNEL: [f64; WINDOW] = [
-    0.001_028_380_084_479_110_9,
+    0.001_028_380_084_479_111,
     0.007_598_758_135_239_185,
     0.036_000_772_128_430_83,
     0.109_360_689_509_700_02,
@@ -259,7 +259,7 @@ const KERNEL: [f64; WINDOW] = [
     0.109_360_689_509_700_02,
     0.036_000_772_128_430_83,
     0.007_598_758_135_239_185,
-    0.001_028_380_084_479_110_9,
+    0.001_028_380_084_479_111,
 ];
 
 /// `out[i] = sum over k of KERNEL[k] x[i + k]`
@@ -289,6 +289,7 @@ fn down(across: &[f64], [v, inner]: [usize; 2], plane: usize, out: &mut [f64]) {
 /// Compiled for the processor's widest vectors; they are never fused, so every processor gives the same bytes.
 #[inline(always)]
 fn wide<R>(work: impl FnOnce() -> R) -> R {
+    #[allow(clippy::redundant_closure)] // only a closure can be told to be inlined where the vectors are
     pulp::Arch::new().dispatch(
         #[inline(always)]
         || work(),

@@ -134,14 +134,14 @@ pub fn reconstruct_on<'a>(
     clock.lap("head");
 
     context.report("symmetry", 0.0)?;
-    let Completed { gaussians, completion, clones, relight } =
+    let Completed { gaussians, completion, mirrored, relight } =
         context.parallel(|| complete(gaussians, options, &views, &geometry));
     plan::note(&mut left_out, "clones", "the mirrored place was observed by a view", completion.not_needed);
     clock.lap("symmetry");
 
     let (gaussians, refinement) = match &options.refine {
         Some(how) => {
-            let (refined, done) = refine::refine(gaussians, &clones, &views, how, &context)?;
+            let (refined, done) = refine::refine(gaussians, &mirrored.tied(), &views, how, &context)?;
             (refined, Some(done))
         }
         None => (gaussians, None),
@@ -295,9 +295,7 @@ fn complete(gaussians: Gaussians, options: &Options, views: &[View], geometry: &
         });
     let range = gaussians.len() - completion.cloned..gaussians.len();
     let (relight, gains) = light.map(|light| light.apply(&mut gaussians, range)).unzip();
-    let gain = |k: usize| gains.as_ref().map_or([1.0; 3], |gains: &Vec<[f32; 3]>| gains[k]);
-    let clones = originals.into_iter().enumerate().map(|(k, of)| Tied { of, gain: gain(k) }).collect();
-    Completed { gaussians, completion, clones, relight }
+    Completed { gaussians, completion, mirrored: Mirrored { originals, gains }, relight }
 }
 
 /// A vehicle with both sides.
@@ -305,9 +303,21 @@ struct Completed {
     /// Originals, then clones.
     gaussians: Gaussians,
     completion: Completion,
-    /// Of what each clone is the mirror image.
-    clones: Vec<Tied>,
+    mirrored: Mirrored,
     relight: Option<Relighting>,
+}
+
+/// Of what each clone is the mirror image, and the factors that its colours took where they took any.
+struct Mirrored {
+    originals: Vec<u32>,
+    gains: Option<Vec<[f32; 3]>>,
+}
+
+impl Mirrored {
+    fn tied(&self) -> Vec<Tied> {
+        let gain = |k: usize| self.gains.as_ref().map_or([1.0; 3], |gains| gains[k]);
+        self.originals.iter().enumerate().map(|(k, &of)| Tied { of, gain: gain(k) }).collect()
+    }
 }
 
 /// Centre and normal of the mirror image of a surfel, and the resolution at which the original was seen.

@@ -8,6 +8,7 @@ mod hostile;
 mod info;
 mod pareto;
 mod reconstruct;
+mod refine;
 mod render;
 
 use std::path::{Path, PathBuf};
@@ -109,10 +110,12 @@ fn json(path: &Path) -> serde_json::Value {
 fn help_documents_every_command_and_the_exit_codes() {
     let folder = Path::new(".");
     let help = succeed(folder, "--help").out;
-    for word in ["reconstruct", "render", "info", "eval", "pareto", "demo", "align", "Exit codes: 0", "130"] {
+    for word in
+        ["reconstruct", "render", "info", "refine", "eval", "pareto", "demo", "align", "Exit codes: 0", "130"]
+    {
         assert!(help.contains(word), "{word} in {help}");
     }
-    for command in ["reconstruct", "render", "info", "eval", "pareto", "demo", "align"] {
+    for command in ["reconstruct", "render", "info", "refine", "eval", "pareto", "demo", "align"] {
         assert!(succeed(folder, &format!("{command} --help")).out.contains("Usage: vg"));
     }
     assert_eq!(succeed(folder, "--version").out, concat!("vg ", env!("CARGO_PKG_VERSION"), "\n"));

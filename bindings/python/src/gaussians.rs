@@ -166,17 +166,8 @@ impl Gaussians {
         sh_degree: u8,
         depth_mode: &str,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let background = background.map_or(Ok(Background::Color([1.0; 3])), parse_background)?;
-        let depth_mode = parse_depth_mode(py, depth_mode)?;
-        let options = RenderOptions {
-            background,
-            antialiased,
-            near,
-            far,
-            sh_degree,
-            depth_mode,
-            ..RenderOptions::default()
-        };
+        let options =
+            RenderOptions { antialiased, near, far, sh_degree, ..planes(py, background, depth_mode)? };
         let camera = &camera.get().inner;
         let drawn = pooled(py, threads, || RENDERER.render(&self.inner, camera, &options))?;
         let size = (drawn.height as usize, drawn.width as usize);
@@ -213,17 +204,8 @@ impl Gaussians {
         sh_degree: u8,
         depth_mode: &str,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let background = background.map_or(Ok(Background::Color([1.0; 3])), parse_background)?;
-        let depth_mode = parse_depth_mode(py, depth_mode)?;
-        let options = RenderOptions {
-            background,
-            antialiased,
-            near,
-            far,
-            sh_degree,
-            depth_mode,
-            ..RenderOptions::default()
-        };
+        let options =
+            RenderOptions { antialiased, near, far, sh_degree, ..planes(py, background, depth_mode)? };
         let camera = &camera.get().inner;
         if color.is_none() && alpha.is_none() && depth.is_none() {
             return Err(bad_value(py, "color, alpha, depth", "all None", "at least one of them"));
@@ -348,12 +330,19 @@ fn parse_background(object: &Bound<'_, PyAny>) -> PyResult<Background> {
     }
 }
 
-fn parse_depth_mode(py: Python<'_>, name: &str) -> PyResult<DepthMode> {
-    match name {
-        "expected" => Ok(DepthMode::Expected),
-        "accumulated" => Ok(DepthMode::Accumulated),
-        other => Err(bad_value(py, "depth_mode", &format!("{other:?}"), "expected, accumulated")),
-    }
+/// How planes are drawn, from what is not a number: a background, white for None, and a mode of depth.
+fn planes(
+    py: Python<'_>,
+    background: Option<&Bound<'_, PyAny>>,
+    depth_mode: &str,
+) -> PyResult<RenderOptions> {
+    let background = background.map_or(Ok(Background::Color([1.0; 3])), parse_background)?;
+    let depth_mode = match depth_mode {
+        "expected" => DepthMode::Expected,
+        "accumulated" => DepthMode::Accumulated,
+        other => return Err(bad_value(py, "depth_mode", &format!("{other:?}"), "expected, accumulated")),
+    };
+    Ok(RenderOptions { background, depth_mode, ..RenderOptions::default() })
 }
 
 /// A plane of a picture's gradient, of `N` numbers a pixel, finite; empty for None.

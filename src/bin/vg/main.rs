@@ -14,6 +14,7 @@ mod info;
 mod job;
 mod pareto;
 mod reconstruct;
+mod refine;
 mod render;
 mod sample;
 mod scene;
@@ -31,6 +32,7 @@ fn main() -> ExitCode {
     };
     let outcome = match &cli.command {
         Command::Reconstruct(args) => reconstruct::run(args),
+        Command::Refine(args) => refine::run(args),
         Command::Render(args) => render::run(args),
         Command::Info(args) => info::run(args),
         Command::Eval(args) => eval::run(args),

@@ -12,13 +12,28 @@ const STEPS: u64 = 100;
 const STAGES: [&str; 10] =
     ["plan", "undistort", "calibrate", "prior", "pixels", "head", "symmetry", "start", "refine", "check"];
 
+/// What a bar of stages looks like.
+const STAGE: &str = "{wide_bar} {msg:9} {elapsed:>4}";
+
 /// A bar on standard error, where that is a terminal; else nothing.
-pub(crate) struct Bar(ProgressBar);
+pub(crate) struct Bar {
+    bar: ProgressBar,
+    /// The stage it begins with.
+    first: usize,
+}
 
 impl Bar {
     /// Of one reconstruction.
     pub(crate) fn of_reconstruction() -> Self {
-        Self::with(STAGES.len() as u64 * STEPS, "{wide_bar} {msg:9} {elapsed:>4}")
+        Self::with(STAGES.len() as u64 * STEPS, STAGE)
+    }
+
+    /// Of a refinement alone: of the stages, it has the one.
+    pub(crate) fn of_refinement() -> Self {
+        let first = STAGES.iter().position(|s| *s == "refine").unwrap_or(0);
+        let mut bar = Self::with(STEPS, STAGE);
+        bar.first = first;
+        bar
     }
 
     /// Of `n` pictures.
@@ -32,30 +47,32 @@ impl Bar {
             bar.set_style(style);
         }
         bar.enable_steady_tick(Duration::from_millis(200));
-        Self(bar)
+        Self { bar, first: 0 }
     }
 
     /// Where a reconstruction stands.
     pub(crate) fn show(&self, progress: Progress) -> ControlFlow<()> {
         match progress.loss {
-            Some(loss) => self.0.set_message(format!("{}, loss {loss:.5}", progress.stage)),
-            None => self.0.set_message(progress.stage),
+            Some(loss) => self.bar.set_message(format!("{}, loss {loss:.5}", progress.stage)),
+            None => self.bar.set_message(progress.stage),
         }
         if let Some(stage) = STAGES.iter().position(|s| *s == progress.stage) {
-            self.0.set_position(stage as u64 * STEPS + (progress.fraction * STEPS as f64) as u64);
+            self.bar.set_position(
+                stage.saturating_sub(self.first) as u64 * STEPS + (progress.fraction * STEPS as f64) as u64,
+            );
         }
         ControlFlow::Continue(())
     }
 
     /// One more picture.
     pub(crate) fn advance(&self) {
-        self.0.inc(1);
+        self.bar.inc(1);
     }
 }
 
 impl Drop for Bar {
     fn drop(&mut self) {
-        self.0.finish_and_clear();
+        self.bar.finish_and_clear();
     }
 }
 

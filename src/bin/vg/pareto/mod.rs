@@ -75,7 +75,7 @@ fn one(path: &Path, args: &ParetoArgs, points: &[Point]) -> Result<Vec<Runs>> {
     let options: Vec<SceneOptions> = points.iter().map(opened).collect::<Result<_>>()?;
     let shown = |options| Shown { scene: path, options, cloud: None, cloud_points: None };
     let mut runs: Vec<Runs> = points.iter().map(|_| Runs::default()).collect();
-    for (_, split) in &splits {
+    for split in splits.values() {
         for ((runs, point), options) in runs.iter_mut().zip(points).zip(&options) {
             let measured = measure::split(&shown(options), split, &point.settings, 1)?;
             runs.seconds.push(vec![measured.reconstruct_ms / 1e3]);

@@ -96,7 +96,7 @@ pub(super) fn svg(rows: &[Row], title: &str) -> String {
              stroke-opacity=\"0.4\"/>\n<circle cx=\"{at_x:.1}\" cy=\"{at_y:.1}\" r=\"4\" fill=\"{color}\"/>\n\
              <text x=\"{:.1}\" y=\"{:.1}\" fill=\"{color}\">{}</text>",
             at_x + 7.0,
-            at_y - 7.0,
+            at_y + 17.0,
             escaped(&row.point)
         );
     }

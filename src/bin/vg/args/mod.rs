@@ -1,0 +1,253 @@
+//! The command line: commands and their options.
+
+mod method;
+mod values;
+
+pub(crate) use method::MethodArgs;
+
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+use values::{background, picture_size, positive, refinement};
+use vg::refine::Amount;
+use vg::render::Background;
+
+/// Reconstructs a vehicle from posed, masked photographs of one side as metric 3D Gaussians.
+#[derive(Parser)]
+#[command(name = "vg", version, after_help = EXIT_CODES, arg_required_else_help = true, infer_long_args = false)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+const EXIT_CODES: &str = "Exit codes: 0 the job is done; 1 it failed (bad data, a file that cannot be read or \
+written); 2 the arguments make no sense; 130 interrupted.\nErrors are one line on standard error: vg: error: <cause>.";
+
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    /// Make a Gaussian model of the vehicle in a scene
+    Reconstruct(ReconstructArgs),
+    /// Move a model that is there already towards a scene's photographs
+    Refine(RefineArgs),
+    /// Draw a model as a scene's cameras see it, or all around it
+    Render(RenderArgs),
+    /// Tell what is in a PLY file, and what is wrong with it
+    Info(InfoArgs),
+    /// Reconstruct from some views of scenes and measure the error in others
+    Eval(EvalArgs),
+    /// Measure error against run time over a sweep of settings
+    Pareto(ParetoArgs),
+    /// Run the whole job on the sample inside this program
+    Demo(DemoArgs),
+    /// Find the similarity from a scene's world to the vehicle's frame, from known camera centres
+    Align(AlignArgs),
+}
+
+/// What a scene's files do not say.
+#[derive(Args)]
+pub(crate) struct FrameArgs {
+    /// Similarity from the scene's world to the vehicle's frame, JSON; a COLMAP model needs one
+    #[arg(long, value_name = "FILE")]
+    pub(crate) vehicle_from_world: Option<PathBuf>,
+}
+
+/// Which of the scene's views.
+#[derive(Args)]
+pub(crate) struct ViewsArgs {
+    /// Views to use, by path, file name, or file name without extension; all if not given
+    #[arg(long, value_name = "NAME,NAME,...", value_delimiter = ',')]
+    pub(crate) views: Option<Vec<String>>,
+}
+
+/// Numbers in depth files.
+#[derive(Args)]
+pub(crate) struct DepthArgs {
+    /// Metres per number in the depth files, instead of what the scene says
+    #[arg(long, value_name = "METRES", value_parser = positive)]
+    pub(crate) depth_scale: Option<f64>,
+}
+
+#[derive(Args)]
+pub(crate) struct ReconstructArgs {
+    /// A transforms.json, a folder with one, or a COLMAP folder (images/, masks/, sparse/0)
+    pub(crate) scene: PathBuf,
+    #[command(flatten)]
+    pub(crate) views: ViewsArgs,
+    #[command(flatten)]
+    pub(crate) method: MethodArgs,
+    #[command(flatten)]
+    pub(crate) frame: FrameArgs,
+    #[command(flatten)]
+    pub(crate) depth: DepthArgs,
+    /// A segmentation network, an ONNX file in the contract of docs/ONNX.md, for the views that have no mask
+    #[arg(long, value_name = "M.onnx")]
+    pub(crate) mask_model: Option<PathBuf>,
+    /// The model, a PLY file in 3DGS's layout
+    #[arg(short, long, value_name = "ASSET.ply")]
+    pub(crate) output: PathBuf,
+    /// Write the metric coloured point cloud as well
+    #[arg(long, value_name = "P.ply", conflicts_with = "baseline")]
+    pub(crate) points: Option<PathBuf>,
+    /// Do not draw the model into the input views to report the error there: about twice as fast with given depth
+    #[arg(long)]
+    pub(crate) no_check: bool,
+    /// Write what was done: settings, stage times, counts, what was left out and why, errors
+    #[arg(long, value_name = "R.json")]
+    pub(crate) report: Option<PathBuf>,
+}
+
+#[derive(Args)]
+pub(crate) struct RefineArgs {
+    /// The model, a PLY file in 3DGS's layout, in the scene's vehicle frame
+    pub(crate) asset: PathBuf,
+    /// The scene, as for `reconstruct`
+    pub(crate) scene: PathBuf,
+    #[command(flatten)]
+    pub(crate) views: ViewsArgs,
+    #[command(flatten)]
+    pub(crate) frame: FrameArgs,
+    /// So many steps, or as many as fit into so many seconds (5s)
+    #[arg(long, value_name = "N|SECONDSs", default_value = "300", value_parser = refinement)]
+    pub(crate) amount: Amount,
+    /// Keep one of three or more views out of the optimisation, to tell when to stop
+    #[arg(long)]
+    pub(crate) hold_out: bool,
+    /// Let Gaussians divide and go, as 3D Gaussian splatting does
+    #[arg(long)]
+    pub(crate) densify: bool,
+    /// Worker threads; 0 means one per core
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) threads: usize,
+    /// The refined model
+    #[arg(short, long, value_name = "ASSET.ply")]
+    pub(crate) output: PathBuf,
+    /// Write what was done
+    #[arg(long, value_name = "R.json")]
+    pub(crate) report: Option<PathBuf>,
+}
+
+#[derive(Args)]
+#[command(group(clap::ArgGroup::new("where").required(true).args(["cameras", "turntable"])))]
+pub(crate) struct RenderArgs {
+    /// The model, a PLY file in 3DGS's layout
+    pub(crate) asset: PathBuf,
+    /// Draw what the cameras of this scene see: <image stem>.png each
+    #[arg(long, value_name = "SCENE")]
+    pub(crate) cameras: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) views: ViewsArgs,
+    #[command(flatten)]
+    pub(crate) frame: FrameArgs,
+    /// Draw N pictures from all around instead
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with_all = ["views", "vehicle_from_world"])]
+    pub(crate) turntable: Option<u32>,
+    /// Size of the turntable's pictures, pixels
+    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = picture_size, conflicts_with = "cameras")]
+    pub(crate) size: (u32, u32),
+    /// What is behind the vehicle; a colour as three numbers from 0 to 255
+    #[arg(long, value_name = "white|black|R,G,B|transparent", default_value = "white", value_parser = background)]
+    pub(crate) background: Background,
+    /// Write depth too: DIR/depth/<image stem>.png, 16-bit millimetres, 0 = none
+    #[arg(long)]
+    pub(crate) depth: bool,
+    /// Worker threads; 0 means one per core
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) threads: usize,
+    /// Folder for the pictures
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+}
+
+#[derive(Args)]
+pub(crate) struct InfoArgs {
+    /// Gaussians or a point cloud, PLY
+    pub(crate) file: PathBuf,
+}
+
+#[derive(Args)]
+pub(crate) struct EvalArgs {
+    /// Scenes, as for `reconstruct`; several make a table with their mean
+    #[arg(required = true)]
+    pub(crate) scenes: Vec<PathBuf>,
+    /// JSON of {"KEY": {"input": [views], "test": [views]}}; a name that is not found here is looked up in each
+    /// scene's folder
+    #[arg(long, value_name = "FILE", default_value = "split.json")]
+    pub(crate) split: PathBuf,
+    /// This key of the split only
+    #[arg(long, value_name = "KEY")]
+    pub(crate) only: Option<String>,
+    #[command(flatten)]
+    pub(crate) method: MethodArgs,
+    #[command(flatten)]
+    pub(crate) frame: FrameArgs,
+    #[command(flatten)]
+    pub(crate) depth: DepthArgs,
+    /// Show the method only N points of the cloud, of those that the input cameras see; a cloud that is not found
+    /// here is looked up in each scene's folder
+    #[arg(long, value_name = "N", requires = "cloud", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) cloud_points: Option<u32>,
+    /// Time the reconstruction R times and report the median
+    #[arg(long, value_name = "R", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) repeat: u32,
+    /// Write the numbers, per view too
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+}
+
+#[derive(Args)]
+pub(crate) struct ParetoArgs {
+    /// Scenes, as for `reconstruct`
+    #[arg(required = true)]
+    pub(crate) scenes: Vec<PathBuf>,
+    /// As for `eval`
+    #[arg(long, value_name = "FILE", default_value = "split.json")]
+    pub(crate) split: PathBuf,
+    /// This key of the split only
+    #[arg(long, value_name = "KEY")]
+    pub(crate) only: Option<String>,
+    /// A point of the sweep: options of `eval` that say how to reconstruct, "--refine 5s", with a name before a colon
+    /// if it is to have one; once for each point
+    #[arg(long = "point", value_name = "[NAME:] OPTIONS", required = true, allow_hyphen_values = true)]
+    pub(crate) points: Vec<String>,
+    /// Options that all points have
+    #[arg(long, value_name = "OPTIONS", default_value = "", allow_hyphen_values = true)]
+    pub(crate) with: String,
+    #[command(flatten)]
+    pub(crate) frame: FrameArgs,
+    /// Time each point R times, one after the other, and report the median and the spread
+    #[arg(long, value_name = "R", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) repeat: u32,
+    /// Write the table
+    #[arg(long, value_name = "FILE")]
+    pub(crate) csv: Option<PathBuf>,
+    /// Write a plot of PSNR against seconds
+    #[arg(long, value_name = "FILE")]
+    pub(crate) svg: Option<PathBuf>,
+    /// Heading of the plot
+    #[arg(long, value_name = "TEXT", default_value = "Error against run time")]
+    pub(crate) title: String,
+    /// Write all numbers
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+}
+
+#[derive(Args)]
+pub(crate) struct DemoArgs {
+    /// Folder for what the demo makes
+    #[arg(default_value = "vg-demo")]
+    pub(crate) folder: PathBuf,
+    /// Worker threads; 0 means one per core
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) threads: usize,
+}
+
+#[derive(Args)]
+pub(crate) struct AlignArgs {
+    /// The scene, usually a COLMAP folder
+    pub(crate) scene: PathBuf,
+    /// Camera centres in the vehicle's frame, metres: {"000.jpg": [x, y, z], ...}, at least three
+    #[arg(long, value_name = "CENTERS.json")]
+    pub(crate) known_centers: PathBuf,
+    /// The similarity, for --vehicle-from-world
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: PathBuf,
+}

@@ -1,0 +1,72 @@
+//! Values on the command line that are more than a number or a name.
+
+use vg::pipeline::Options;
+use vg::refine::{Amount, RefineOptions};
+use vg::render::Background;
+
+/// Length, width, height in metres. A type of its own: the parser would take an array for a list of values.
+#[derive(Clone, Copy)]
+pub(super) struct VehicleSize(pub(super) [f64; 3]);
+
+pub(super) fn vehicle_size(text: &str) -> Result<VehicleSize, String> {
+    let size = numbers::<f64>(text).ok_or("expected three numbers, length,width,height in metres")?;
+    match (Options { vehicle_size: Some(size), ..Options::default() }).validate() {
+        Ok(()) => Ok(VehicleSize(size)),
+        Err(vg::Error::Argument { allowed, .. }) => Err(format!("expected {allowed}")),
+        Err(other) => Err(other.to_string()),
+    }
+}
+
+pub(super) fn background(text: &str) -> Result<Background, String> {
+    match text {
+        "white" => Ok(Background::Color([1.0; 3])),
+        "black" => Ok(Background::Color([0.0; 3])),
+        "transparent" => Ok(Background::Transparent),
+        other => numbers::<u8>(other)
+            .map(|rgb| Background::Color(rgb.map(|c| f32::from(c) / 255.0)))
+            .ok_or_else(|| "expected white, black, transparent, or R,G,B with numbers from 0 to 255".into()),
+    }
+}
+
+/// Three numbers with commas between.
+fn numbers<T: std::str::FromStr>(text: &str) -> Option<[T; 3]> {
+    let numbers: Vec<T> = text.split(',').map(|part| part.trim().parse()).collect::<Result<_, _>>().ok()?;
+    numbers.try_into().ok()
+}
+
+pub(super) fn picture_size(text: &str) -> Result<(u32, u32), String> {
+    let side =
+        |text: &str| text.parse().ok().filter(|side| (1..=vg::geometry::camera::MAX_SIDE).contains(side));
+    text.split_once('x')
+        .and_then(|(w, h)| Some((side(w)?, side(h)?)))
+        .ok_or_else(|| format!("expected WxH, each 1 to {}", vg::geometry::camera::MAX_SIDE))
+}
+
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|value: &f64| *value > 0.0 && value.is_finite())
+        .ok_or_else(|| "expected a number above 0".into())
+}
+
+pub(super) fn refinement(text: &str) -> Result<Amount, String> {
+    let amount = match text.strip_suffix('s') {
+        Some(seconds) => seconds.parse().ok().map(Amount::Seconds),
+        None => text.parse().ok().map(Amount::Iterations),
+    };
+    let amount = amount.ok_or("expected a number of steps (300) or of seconds (5s)")?;
+    match (RefineOptions { amount, ..RefineOptions::default() }).validate() {
+        Ok(()) => Ok(amount),
+        Err(vg::Error::Argument { allowed, .. }) => Err(format!("expected {allowed}")),
+        Err(other) => Err(other.to_string()),
+    }
+}
+
+pub(super) fn share(text: &str) -> Result<f64, String> {
+    let inside = |share: &f64| *share > 0.0 && *share <= 1.0;
+    text.parse().ok().filter(inside).ok_or_else(|| "expected a number above 0, at most 1".into())
+}
+
+pub(super) fn at_least_one(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above 0".into())
+}
