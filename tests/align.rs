@@ -55,7 +55,7 @@ fn ten_vehicles_are_aligned_within_half_a_percent_half_a_degree_and_three_centim
     folders.sort();
     for folder in &folders {
         let start = Instant::now();
-        let scene = vg::io::read_masked(folder).unwrap();
+        let scene = vg::io::read_masked(&folder.join("sparse/0")).unwrap();
         let (points, _) = vg::io::ply::read_points(&folder.join("pcd.ply")).unwrap();
         let cloud = Cloud::new(points).unwrap();
         let found = to_scan(&scene.views, &scene.points, &cloud, Heading::Auto);

@@ -13,7 +13,10 @@ use rayon::prelude::*;
 const HEADINGS: usize = 8;
 
 /// Steps on the support functions.
-const STEPS: usize = 40;
+const STEPS: usize = 25;
+
+/// Views that are asked, at most: they say little that their neighbours do not.
+const VIEWS: usize = 16;
 
 /// Losses bend here, pixels: first everything pulls, then what fits.
 const BENDS_PX: [f64; 2] = [30.0, 4.0];
@@ -34,10 +37,11 @@ pub(super) fn find(outlines: &[Outline], scan: &Scan, ground: Option<DVec3>) -> 
             })
         })
         .collect();
+    let outlines: Vec<&Outline> = outlines.iter().step_by(outlines.len().div_ceil(VIEWS)).collect();
     let fit = |start: &Similarity| {
-        let fit = |s, bend| descend(s, scan.center, STEPS, |s| coarse(outlines, scan, s, bend)).0;
+        let fit = |s, bend| descend(s, scan.center, STEPS, |s| coarse(&outlines, scan, s, bend)).0;
         let found = BENDS_PX.into_iter().fold(*start, fit);
-        (coarse(outlines, scan, &found, BENDS_PX[1]).cost, found)
+        (coarse(&outlines, scan, &found, BENDS_PX[1]).cost, found)
     };
     let mut found: Vec<(f64, Similarity)> = starts.par_iter().map(fit).collect();
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -85,7 +89,8 @@ pub(super) fn middle(outlines: &[Outline]) -> Result<DVec3> {
 /// Metres per unit of the world, from how large the scan would look where the vehicle is.
 fn scale(outlines: &[Outline], scan: &Scan, middle: DVec3) -> Result<f64> {
     // A convex body's mean width over all directions, seen from all around, is that of its corners.
-    let spread = scan.corners.iter().map(|p| (*p - scan.center).length()).sum::<f64>() / scan.corners.len() as f64;
+    let spread =
+        scan.corners.iter().map(|p| (*p - scan.center).length()).sum::<f64>() / scan.corners.len() as f64;
     let radii: Vec<f64> = outlines
         .iter()
         .filter_map(|o| Some(o.angular_radius()? * o.pose().translation.distance(middle)))

@@ -26,7 +26,14 @@ pub(super) fn of_vehicle(sparse: &[DVec3], outlines: &[Outline]) -> Vec<DVec3> {
 
 /// Distances of points to the scan's planes, in units of `noise` metres; points farther than `reach` metres say
 /// nothing (reflections, interiors, the ground).
-pub(super) fn system(points: &[DVec3], scan: &Scan, s: &Similarity, reach: f64, noise: f64, weight: f64) -> System {
+pub(super) fn system(
+    points: &[DVec3],
+    scan: &Scan,
+    s: &Similarity,
+    reach: f64,
+    noise: f64,
+    weight: f64,
+) -> System {
     let mut system = System::new();
     let bend = 0.5 * reach / noise;
     for found in distances(points, scan, s, reach) {

@@ -19,7 +19,7 @@ use candidates::{turn_between, turned};
 use glam::DVec3;
 use rayon::prelude::*;
 use scan::Scan;
-use silhouettes::{Misses, Outline};
+use silhouettes::Outline;
 
 /// Fewer masks leave scale or place open.
 pub const FEWEST_VIEWS: usize = 3;
@@ -27,8 +27,14 @@ pub const FEWEST_VIEWS: usize = 3;
 /// Fewer pieces of edge in all masks together are no outline.
 const FEWEST_EDGES: usize = 60;
 
-/// Coarse alignments that are refined.
-const REFINED: usize = 4;
+/// Coarse alignments that are tried with the first rounds.
+const TRIED: usize = 4;
+
+/// Rounds of refinement that tell which coarse alignment is right, on every [`THINNED`]th point.
+const FIRST_ROUNDS: usize = 2;
+
+/// See [`FIRST_ROUNDS`]: points twice as far apart.
+const THINNED: usize = 4;
 
 /// Rounds of refinement: how far from the edge the outline is looked for and where the loss bends, pixels; how far
 /// from the scan a sparse point counts, metres.
@@ -102,20 +108,23 @@ pub fn to_scan(views: &[View], sparse: &[DVec3], scan: &Cloud, heading: Heading)
     let starts = candidates::find(&outlines, &scan, ground)?;
     let points = icp::of_vehicle(sparse, &outlines);
 
-    let refined = |s: Similarity| {
-        let s = refine(&outlines, &scan, &points, s);
-        (s, silhouettes::misses(&outlines, &scan, &s, COMPARED_PX))
+    let thin: Vec<DVec3> = scan.points.iter().step_by(THINNED).copied().collect();
+    let tried = |s: Similarity| {
+        let s = refine(&outlines, &scan, &thin, &points, s, &ROUNDS[..FIRST_ROUNDS]);
+        (s, silhouettes::misses(&outlines, &thin, &s, COMPARED_PX).mean_px)
     };
-    let starts = starts.into_iter().take(REFINED);
-    let (best, misses) = best(starts.map(refined)).ok_or_else(|| nowhere("no start leads anywhere"))?;
-    let (other, other_misses) = {
-        // Whatever was found the other way round, and the best one exactly turned.
-        let around = candidates::find(&outlines, &scan, ground)?.into_iter();
-        let around = around.filter(|s| turn_between(s, &best) > std::f64::consts::FRAC_PI_2).take(1);
-        let both = around.chain([turned(&best, scan.center)]).map(refined);
-        let opposite = both.filter(|s| turn_between(&s.0, &best) > std::f64::consts::FRAC_PI_2);
-        self::best(opposite).unwrap_or((turned(&best, scan.center), Misses { mean_px: COMPARED_PX, ..misses }))
+    let finished = |s: Similarity| {
+        let s = refine(&outlines, &scan, &scan.points, &points, s, &ROUNDS[FIRST_ROUNDS..]);
+        (s, silhouettes::misses(&outlines, &scan.points, &s, COMPARED_PX))
     };
+    let first: Vec<(Similarity, f64)> = starts.into_iter().take(TRIED).map(tried).collect();
+    let best = best_of(first.iter().copied()).ok_or_else(|| nowhere("no start leads anywhere"))?;
+    // Whatever was found the other way round, and the best one exactly turned.
+    let is_opposite = |s: &Similarity| turn_between(s, &best) > std::f64::consts::FRAC_PI_2;
+    let exactly = turned(&best, scan.center);
+    let opposite = first.iter().copied().chain([tried(exactly)]).filter(|f| is_opposite(&f.0));
+    let other = best_of(opposite).unwrap_or(exactly);
+    let ((best, misses), (other, other_misses)) = (finished(best), finished(other));
     let ((chosen, misses), other_misses) = match heading {
         Heading::Auto => ((best, misses), other_misses),
         asked => {
@@ -180,22 +189,30 @@ fn nowhere(reason: &str) -> Error {
     }
 }
 
-fn best(found: impl Iterator<Item = (Similarity, Misses)>) -> Option<(Similarity, Misses)> {
-    found.min_by(|a, b| a.1.mean_px.total_cmp(&b.1.mean_px))
+fn best_of(found: impl Iterator<Item = (Similarity, f64)>) -> Option<Similarity> {
+    found.min_by(|a, b| a.1.total_cmp(&b.1)).map(|f| f.0)
 }
 
-fn refine(outlines: &[Outline], scan: &Scan, points: &[DVec3], start: Similarity) -> Similarity {
+/// `surface` are points of the scan, `sparse` points of the world that show the vehicle.
+fn refine(
+    outlines: &[Outline],
+    scan: &Scan,
+    surface: &[DVec3],
+    sparse: &[DVec3],
+    start: Similarity,
+    rounds: &[(f64, f64, f64)],
+) -> Similarity {
     let edges: usize = outlines.iter().map(Outline::edge_count).sum();
-    let weight = POINTS_SHARE * edges as f64 / points.len().max(1) as f64;
-    let round = |s, (reach, bend, near): (f64, f64, f64)| {
+    let weight = POINTS_SHARE * edges as f64 / sparse.len().max(1) as f64;
+    let round = |s, &(reach, bend, near): &(f64, f64, f64)| {
         let system = |s: &Similarity| {
-            let edges = silhouettes::fine(outlines, scan, s, reach, bend);
-            let points = icp::system(points, scan, s, near, POINT_NOISE_M, weight.min(1.0));
+            let edges = silhouettes::fine(outlines, surface, s, scan.center, reach, bend);
+            let points = icp::system(sparse, scan, s, near, POINT_NOISE_M, weight.min(1.0));
             solve::System::sum([edges, points])
         };
         solve::descend(s, scan.center, STEPS, system).0
     };
-    ROUNDS.into_iter().fold(start, round)
+    rounds.iter().fold(start, round)
 }
 
 fn first_camera(views: &[View]) -> DVec3 {
@@ -211,7 +228,8 @@ fn ahead(s: &Similarity, camera: DVec3, scan: &Scan) -> Result<bool> {
     if seen.x.abs() < ABEAM {
         return Err(Error::Reconstruction {
             stage: "align",
-            reason: "--heading: the first picture was taken from abeam, neither from ahead nor from behind".into(),
+            reason: "--heading: the first picture was taken from abeam, neither from ahead nor from behind"
+                .into(),
         });
     }
     Ok(seen.x > 0.0)

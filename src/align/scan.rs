@@ -27,7 +27,7 @@ const OFF: f64 = 6.0;
 const SIZES_M: std::ops::RangeInclusive<f64> = 1.0..=25.0;
 
 /// Directions in which the outermost points are looked for.
-const DIRECTIONS: usize = 2000;
+const DIRECTIONS: usize = 1000;
 
 /// A scan of a vehicle in the vehicle's frame, metres.
 pub(super) struct Scan {
@@ -37,8 +37,6 @@ pub(super) struct Scan {
     pub(super) tree: Tree,
     /// Middle of the box.
     pub(super) center: DVec3,
-    /// Half the box's diagonal.
-    pub(super) radius: f64,
     /// The corners of the convex hull, nearly: no other point is outermost in any picture.
     pub(super) corners: Vec<DVec3>,
 }
@@ -66,8 +64,7 @@ impl Scan {
         }
         let corners = corners(&points);
         let tree = Tree::new(&points);
-        let (center, radius) = (0.5 * (low + high), 0.5 * size.length());
-        Ok(Self { points, normals, tree, center, radius, corners })
+        Ok(Self { points, normals, tree, center: 0.5 * (low + high), corners })
     }
 }
 

@@ -27,6 +27,14 @@ const BESIDE_PX: f64 = 1.5;
 /// Pixels of a cell of projected points.
 const CELL: f64 = 4.0;
 
+/// The scan's surface goes on beyond its outermost point: by the gap to the next point on average where points end
+/// abruptly (an edge), by half of it where they crowd (a rounded outline). Without this, vehicles come out
+/// too small by 0.25 to 0.45 %; with it, by 0.1 to 0.3 %.
+const GAP_SHARE: f64 = 0.75;
+
+/// Wider gaps are holes in the scan, pixels.
+const WIDEST_GAP_PX: f64 = 2.0;
+
 /// Points nearer to a camera than this have no place in its picture, metres.
 const NEAR_M: f64 = 0.05;
 
@@ -41,12 +49,6 @@ pub(super) struct Outline {
     support: Vec<(DVec2, f64)>,
     /// Middle of a piece of edge, and outward unit normal.
     edges: Vec<(DVec2, DVec2)>,
-}
-
-/// A projected point: where, and which way it would go.
-struct Seen {
-    pixel: DVec2,
-    index: u32,
 }
 
 impl Outline {
@@ -177,9 +179,8 @@ impl Outline {
     }
 
     fn pixel(&self, p: DVec3) -> Option<DVec2> {
-        (p.z > NEAR_M).then(|| {
-            DVec2::from_array(self.intrinsics.pixel_from_normalized([p.x / p.z, p.y / p.z]))
-        })
+        (p.z > NEAR_M)
+            .then(|| DVec2::from_array(self.intrinsics.pixel_from_normalized([p.x / p.z, p.y / p.z])))
     }
 
     /// How the pixel of `point` moves along `direction` with the seven numbers. The similarity moves the cameras; for
@@ -219,58 +220,42 @@ impl Outline {
 
     /// For each piece of edge: by how much the scan's outline lies outside, pixels, the point, and its distance; `None`
     /// where no point is within `reach` pixels.
-    fn misses(&self, scan: &Scan, pose: &Pose, reach: f64) -> Vec<Option<(f64, usize, f64)>> {
+    fn misses(&self, points: &[DVec3], pose: &Pose, reach: f64) -> Vec<Option<Miss>> {
         let camera_from_vehicle = pose.inverse();
-        let (columns, rows) = ((self.width as f64 / CELL) as usize + 1, (self.height as f64 / CELL) as usize + 1);
-        let mut cells: Vec<Vec<Seen>> = Vec::new();
-        cells.resize_with(columns * rows, Vec::new);
-        for (point, index) in scan.points.iter().zip(0u32..) {
-            let Some(pixel) = self.pixel(camera_from_vehicle.transform_point(*point)) else { continue };
-            let inside = pixel.cmpge(DVec2::ZERO).all()
-                && pixel.x < self.width as f64
-                && pixel.y < self.height as f64;
-            if inside {
-                let cell = (pixel.y / CELL) as usize * columns + (pixel.x / CELL) as usize;
-                cells[cell].push(Seen { pixel, index });
-            }
-        }
+        let cells = Cells::new(self, points.iter().map(|p| camera_from_vehicle.transform_point(*p)));
         let outermost = |&(middle, normal): &(DVec2, DVec2)| {
             let along = normal.perp();
-            let range = |x: f64, n: usize| {
-                let low = ((x - reach - BESIDE_PX) / CELL).max(0.0) as usize;
-                low..=(((x + reach + BESIDE_PX) / CELL).max(0.0) as usize).min(n - 1)
-            };
-            let mut best: Option<(f64, usize)> = None;
-            for row in range(middle.y, rows) {
-                for column in range(middle.x, columns) {
-                    for seen in &cells[row * columns + column] {
-                        let d = seen.pixel - middle;
-                        let out = d.dot(normal);
-                        if d.dot(along).abs() <= BESIDE_PX
-                            && out.abs() <= reach
-                            && best.is_none_or(|b| out > b.0)
-                        {
-                            best = Some((out, seen.index as usize));
-                        }
+            let mut last = [(f64::NEG_INFINITY, 0); 2];
+            cells.around(middle, reach + BESIDE_PX, |pixel, index| {
+                let d = pixel - middle;
+                let out = d.dot(normal);
+                if d.dot(along).abs() <= BESIDE_PX && out.abs() <= reach && out > last[1].0 {
+                    last[1] = (out, index);
+                    if out > last[0].0 {
+                        last.swap(0, 1);
                     }
                 }
-            }
-            best.map(|(out, index)| {
-                (out, index, camera_from_vehicle.transform_point(scan.points[index]).z)
+            });
+            let [(out, index), (before, _)] = last;
+            let gap = if before.is_finite() { (out - before).min(WIDEST_GAP_PX) } else { 0.0 };
+            out.is_finite().then(|| Miss {
+                out: out + GAP_SHARE * gap,
+                index,
+                distance: camera_from_vehicle.transform_point(points[index]).z,
             })
         };
         self.edges.iter().map(outermost).collect()
     }
 
     /// Outlines of scan and mask, differences in pixels.
-    fn fine(&self, scan: &Scan, s: &Similarity, reach: f64, bend: f64) -> System {
+    fn fine(&self, points: &[DVec3], s: &Similarity, center: DVec3, reach: f64, bend: f64) -> System {
         let mut system = System::new();
         let pose = s.transform_pose(&self.world_from_camera);
-        for (miss, edge) in self.misses(scan, &pose, reach).into_iter().zip(&self.edges) {
+        for (miss, edge) in self.misses(points, &pose, reach).into_iter().zip(&self.edges) {
             match miss {
-                Some((out, index, _)) => {
-                    let slope = self.pixel_slope(scan.points[index], &pose, scan.center, edge.1);
-                    system.add(out, &slope, 1.0, bend);
+                Some(miss) => {
+                    let slope = self.pixel_slope(points[miss.index], &pose, center, edge.1);
+                    system.add(miss.out, &slope, 1.0, bend);
                 }
                 None => system.add_constant(bend * (reach - 0.5 * bend)),
             }
@@ -279,14 +264,75 @@ impl Outline {
     }
 }
 
+/// The scan's outline beside a piece of edge.
+struct Miss {
+    /// How far outside it lies, pixels.
+    out: f64,
+    /// The outermost point.
+    index: usize,
+    /// Its depth, metres.
+    distance: f64,
+}
+
+/// Projected points by cells of the picture; those of a cell are chained.
+struct Cells {
+    columns: usize,
+    rows: usize,
+    first: Vec<u32>,
+    /// Pixel, index of the point, and the next one of the cell.
+    seen: Vec<(DVec2, u32, u32)>,
+}
+
+impl Cells {
+    fn new(outline: &Outline, points_camera: impl Iterator<Item = DVec3>) -> Self {
+        let (width, height) = (outline.width as f64, outline.height as f64);
+        let (columns, rows) = ((width / CELL) as usize + 1, (height / CELL) as usize + 1);
+        let mut cells = Self { columns, rows, first: vec![u32::MAX; columns * rows], seen: Vec::new() };
+        for (point, index) in points_camera.zip(0u32..) {
+            let Some(pixel) = outline.pixel(point) else { continue };
+            if pixel.x >= 0.0 && pixel.y >= 0.0 && pixel.x < width && pixel.y < height {
+                let first = &mut cells.first[(pixel.y / CELL) as usize * columns + (pixel.x / CELL) as usize];
+                cells.seen.push((pixel, index, *first));
+                *first = cells.seen.len() as u32 - 1;
+            }
+        }
+        cells
+    }
+
+    /// All points in the cells that a square of half a side `reach` touches.
+    fn around(&self, middle: DVec2, reach: f64, mut visit: impl FnMut(DVec2, usize)) {
+        let range = |x: f64, n: usize| {
+            let low = ((x - reach) / CELL).max(0.0) as usize;
+            low..=(((x + reach) / CELL).max(0.0) as usize).min(n - 1)
+        };
+        for row in range(middle.y, self.rows) {
+            for column in range(middle.x, self.columns) {
+                let mut at = self.first[row * self.columns + column];
+                while let Some(&(pixel, index, next)) = self.seen.get(at as usize) {
+                    visit(pixel, index as usize);
+                    at = next;
+                }
+            }
+        }
+    }
+}
+
 /// All pictures' support functions.
-pub(super) fn coarse(outlines: &[Outline], scan: &Scan, s: &Similarity, bend: f64) -> System {
+pub(super) fn coarse(outlines: &[&Outline], scan: &Scan, s: &Similarity, bend: f64) -> System {
     System::sum(outlines.par_iter().map(|o| o.coarse(scan, s, bend)).collect::<Vec<_>>())
 }
 
 /// All pictures' outlines.
-pub(super) fn fine(outlines: &[Outline], scan: &Scan, s: &Similarity, reach: f64, bend: f64) -> System {
-    System::sum(outlines.par_iter().map(|o| o.fine(scan, s, reach, bend)).collect::<Vec<_>>())
+pub(super) fn fine(
+    outlines: &[Outline],
+    points: &[DVec3],
+    s: &Similarity,
+    center: DVec3,
+    reach: f64,
+    bend: f64,
+) -> System {
+    let of = |o: &Outline| o.fine(points, s, center, reach, bend);
+    System::sum(outlines.par_iter().map(of).collect::<Vec<_>>())
 }
 
 /// How far outlines of scan and mask lie apart.
@@ -299,16 +345,16 @@ pub(super) struct Misses {
 }
 
 /// Measures with points up to `reach` pixels from the edge.
-pub(super) fn misses(outlines: &[Outline], scan: &Scan, s: &Similarity, reach: f64) -> Misses {
+pub(super) fn misses(outlines: &[Outline], points: &[DVec3], s: &Similarity, reach: f64) -> Misses {
     let of = |o: &Outline| {
-        let found = o.misses(scan, &s.transform_pose(&o.world_from_camera), reach);
+        let found = o.misses(points, &s.transform_pose(&o.world_from_camera), reach);
         let focal = o.intrinsics.smaller_focal();
-        found
-            .into_iter()
-            .map(|m| m.map_or((reach, f64::INFINITY), |(out, _, z)| (out.abs(), out.abs() * z / focal)))
-            .collect::<Vec<_>>()
+        let far = (reach, f64::INFINITY);
+        let sizes = |m: Option<Miss>| m.map_or(far, |m| (m.out.abs(), m.out.abs() * m.distance / focal));
+        found.into_iter().map(sizes).collect::<Vec<_>>()
     };
-    let all: Vec<(f64, f64)> = outlines.par_iter().map(of).collect::<Vec<_>>().into_iter().flatten().collect();
+    let all: Vec<(f64, f64)> =
+        outlines.par_iter().map(of).collect::<Vec<_>>().into_iter().flatten().collect();
     let metres: Vec<f64> = all.iter().map(|m| m.1).collect();
     let mean_px = all.iter().map(|m| m.0).sum::<f64>() / all.len().max(1) as f64;
     Misses { mean_px, median_m: super::scan::median(&metres) }

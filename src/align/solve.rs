@@ -27,11 +27,8 @@ impl System {
     /// A residual in units of its noise, its slope, and the Huber loss that is linear from `bend` on.
     pub(super) fn add(&mut self, residual: f64, slope: &Numbers, weight: f64, bend: f64) {
         let size = residual.abs();
-        let (loss, part) = if size <= bend {
-            (0.5 * size * size, 1.0)
-        } else {
-            (bend * (size - 0.5 * bend), bend / size)
-        };
+        let (loss, part) =
+            if size <= bend { (0.5 * size * size, 1.0) } else { (bend * (size - 0.5 * bend), bend / size) };
         self.cost += weight * loss;
         self.matrix += (weight * part) * slope * slope.transpose();
         self.right -= (weight * part * residual) * slope;
@@ -66,15 +63,7 @@ impl System {
 pub(super) fn slope(point: DVec3, center: DVec3, direction: DVec3) -> Numbers {
     let arm = point - center;
     let turn = arm.cross(direction);
-    Numbers::from([
-        turn.x,
-        turn.y,
-        turn.z,
-        direction.x,
-        direction.y,
-        direction.z,
-        arm.dot(direction),
-    ])
+    Numbers::from([turn.x, turn.y, turn.z, direction.x, direction.y, direction.z, arm.dot(direction)])
 }
 
 /// The similarity after a step.

@@ -34,7 +34,15 @@ impl Tree {
         found
     }
 
-    fn search(&self, low: usize, high: usize, q: DVec3, count: usize, most: f64, found: &mut Vec<(f64, u32)>) {
+    fn search(
+        &self,
+        low: usize,
+        high: usize,
+        q: DVec3,
+        count: usize,
+        most: f64,
+        found: &mut Vec<(f64, u32)>,
+    ) {
         let worst = |found: &Vec<(f64, u32)>| if found.len() < count { most } else { found[count - 1].0 };
         let visit = |&(p, index): &(DVec3, u32), found: &mut Vec<(f64, u32)>| {
             let squared = p.distance_squared(q);

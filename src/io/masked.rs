@@ -50,8 +50,7 @@ fn read_view(listed: &listing::ListedView) -> Result<Option<View>> {
         }
     };
     if (mask.width(), mask.height()) != (width, height) {
-        let reason =
-            format!("{}x{}, but its camera is {width}x{height}", mask.width(), mask.height());
+        let reason = format!("{}x{}, but its camera is {width}x{height}", mask.width(), mask.height());
         return Err(Error::format(path, "size", reason));
     }
     let black = vec![[0; 3]; width as usize * height as usize];
