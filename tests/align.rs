@@ -68,6 +68,23 @@ fn ten_vehicles_are_aligned_within_half_a_percent_half_a_degree_and_three_centim
                 continue;
             }
         };
+        let vehicle: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(folder.join("vehicle.json")).unwrap()).unwrap();
+        let size = ["length_m", "width_m", "height_m"].map(|k| vehicle[k].as_f64().unwrap());
+        for h in [Heading::Forward, Heading::Backward] {
+            let start = Instant::now();
+            match vg::align::to_box(&scene.views, &scene.points, size, h) {
+                Ok(b) => say(&format!(
+                    "{:?} {:?} {:?} {:?} {size:?} {}",
+                    start.elapsed(),
+                    errors(&b.vehicle_from_world, &truth(folder)),
+                    b.confidence,
+                    b.found_m,
+                    b.asked_view
+                )),
+                Err(e) => say(&e.to_string()),
+            }
+        }
         let (scale, angle, position) = errors(&found.vehicle_from_world, &truth(folder));
         say(&format!(
             "| {name} | {:+.3} | {angle:.3} | {:.2} | {:.1} mm | {:.2} px / {:.2} | {:.2} | {} ({:.1} mm) | {seconds:.1} |",

@@ -3,6 +3,7 @@
 use super::candidates::up_of_pictures;
 use super::scan::plane_of;
 use super::silhouettes::Outline;
+use crate::geometry::robust::scramble;
 use glam::DVec3;
 
 /// Planes tried: three of half the points lie in one plane once in eight times.
@@ -17,8 +18,8 @@ const THICKNESS: f64 = 0.004;
 /// Fewer points are no ground.
 const FEWEST: usize = 50;
 
-/// Its normal, up, world; `None` where the points show no ground.
-pub(super) fn normal(sparse: &[DVec3], outlines: &[Outline]) -> Option<DVec3> {
+/// A point of it and its normal, up, world; `None` where the points show no ground.
+pub(super) fn plane(sparse: &[DVec3], outlines: &[Outline]) -> Option<(DVec3, DVec3)> {
     if sparse.len() < FEWEST {
         return None;
     }
@@ -45,14 +46,6 @@ pub(super) fn normal(sparse: &[DVec3], outlines: &[Outline]) -> Option<DVec3> {
     if best.len() < FEWEST {
         return None;
     }
-    let n = plane_of(&best).1;
-    Some(if n.dot(up) < 0.0 { -n } else { n })
-}
-
-/// The same numbers on every machine (splitmix64).
-fn scramble(i: u64) -> u64 {
-    let z = i.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
+    let (point, n) = plane_of(&best);
+    Some((point, if n.dot(up) < 0.0 { -n } else { n }))
 }
