@@ -13,6 +13,7 @@
 
 #![warn(unreachable_pub)]
 
+pub mod align;
 pub mod calibrate;
 pub mod capi;
 pub mod error;

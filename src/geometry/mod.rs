@@ -12,9 +12,11 @@ pub mod distortion;
 pub mod frame;
 pub(crate) mod nearest;
 pub mod pose;
+pub mod robust;
 pub(crate) mod unfolded;
 
 pub use align::Similarity;
 pub use camera::{Camera, CameraModel, Intrinsics, OpenCvModel};
 pub use distortion::Distortion;
 pub use pose::Pose;
+pub use robust::RobustFit;

@@ -1,6 +1,7 @@
 //! Pictures and masks from PNG and JPEG files, and PNG files of what was rendered.
 
 use super::files::{read_limited, write_atomically};
+use super::npy;
 use crate::error::{Error, Result};
 use crate::geometry::camera::MAX_SIDE;
 use crate::scene::mask::VEHICLE_THRESHOLD;
@@ -38,16 +39,20 @@ pub fn decode(bytes: &[u8], path: &Path) -> Result<Picture> {
 }
 
 /// A mask: luminance of [`VEHICLE_THRESHOLD`] and above is vehicle. A picture that is transparent somewhere is
-/// a cut-out, and counts by its alpha instead.
+/// a cut-out, and counts by its alpha instead. Of a NumPy array, true counts, or [`VEHICLE_THRESHOLD`] and above.
 pub fn read_mask(path: &Path) -> Result<Mask> {
     decode_mask(&read_limited(path, MAX_FILE)?, path).map(|(mask, _)| mask)
 }
 
 /// The mask and its largest value, which tells a mask of zeros and ones from an empty one.
 pub(crate) fn decode_mask(bytes: &[u8], path: &Path) -> Result<(Mask, u8)> {
-    let decoded = decode_any(bytes, path)?;
-    let (width, height) = (decoded.width(), decoded.height());
-    let values = transparency(&decoded).unwrap_or_else(|| decoded.into_luma8().into_raw());
+    let (width, height, values) = if npy::is_npy(bytes) {
+        npy::decode_mask(bytes, path)?
+    } else {
+        let decoded = decode_any(bytes, path)?;
+        let (width, height) = (decoded.width(), decoded.height());
+        (width, height, transparency(&decoded).unwrap_or_else(|| decoded.into_luma8().into_raw()))
+    };
     let largest = values.iter().copied().max().unwrap_or(0);
     Ok((Mask::from_strided("mask", &values, width, height, width as usize)?, largest))
 }

@@ -6,7 +6,7 @@
 use super::depth::{DepthFormat, MILLIMETRES};
 use super::files::read_limited;
 use super::scene::SceneFormat;
-use super::{colmap, image, json, transforms};
+use super::{colmap, image, json, realcar, transforms};
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use std::path::{Path, PathBuf};
@@ -63,13 +63,13 @@ pub(super) fn list(path: &Path, format: Option<SceneFormat>) -> Result<Listing> 
     if transforms.is_file() && format != Some(SceneFormat::Colmap) {
         return list_transforms(&transforms);
     }
-    match colmap::find_model(path) {
+    match colmap::find_model(path).or_else(|| realcar::find_model(path)) {
         Some(model) if format != Some(SceneFormat::Transforms) => list_colmap(path, &model),
         _ => Err(Error::format(path, "scene", NO_SCENE)),
     }
 }
 
-const NO_SCENE: &str = "neither a transforms.json, nor a folder with one, nor a folder with a COLMAP model (cameras.bin and images.bin, or .txt, in sparse/0, in sparse, or in itself)";
+const NO_SCENE: &str = "neither a transforms.json, nor a folder with one, nor a folder with a COLMAP model (cameras.bin and images.bin, or .txt, in sparse/0, in sparse, in itself, or as 3DRealCar has it in colmap_processed/pcd_rescale)";
 
 fn list_transforms(path: &Path) -> Result<Listing> {
     let file = transforms::parse(&read_limited(path, json::MAX_FILE)?, path)?;
@@ -119,8 +119,9 @@ fn list_colmap(path: &Path, model: &Path) -> Result<Listing> {
             path_in_file: name.clone(),
             name,
             camera: read.camera_of(image)?,
-            image: root.join("images").join(&image.name),
-            mask: find_mask(&root.join("masks"), &[&image.name]),
+            image: realcar::find_image(&root, &image.name),
+            mask: find_mask(&root.join("masks"), &[&image.name])
+                .or_else(|| realcar::find_mask(&root, &image.name)),
             depth: find_depth(&root.join("depth"), &image.name),
         })
     });

@@ -12,19 +12,23 @@ pub mod image;
 mod json;
 mod listing;
 mod load;
+mod masked;
 mod npy;
 mod pfm;
 pub mod ply;
+mod realcar;
 pub mod scene;
 mod select;
 pub mod transforms;
 pub mod vehicle_frame;
 
 pub use files::write_atomically;
+pub use masked::{MaskedViews, read_masked};
+pub use realcar::find_scan;
 pub use scene::{
     NamedCamera, SceneFiles, SceneFormat, SceneIndex, SceneOptions, SceneView, list_scene, open_scene,
 };
 pub use vehicle_frame::{
-    Alignment, read_known_centers, read_vehicle_from_world, vehicle_from_known_centers,
-    write_vehicle_from_world,
+    Alignment, FitQuality, read_known_centers, read_matrix, read_vehicle_from_world,
+    vehicle_from_known_centers, write_alignment, write_vehicle_from_world,
 };

@@ -1,4 +1,5 @@
-//! NumPy's `.npy`, versions 1 to 3, as far as a depth map needs it: one little-endian f4 or f8 array in C order.
+//! NumPy's `.npy`, versions 1 to 3, as far as depth maps and masks need it: one array in C order, of little-endian f4
+//! or f8, or of booleans or bytes.
 
 use super::depth::checked_size;
 use crate::error::{Error, Result};
@@ -6,16 +7,48 @@ use std::path::Path;
 
 /// Width, height and values in row order of a `[height][width]` array; axes of length one around it are dropped.
 pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<(u32, u32, Vec<f32>)> {
+    let array = array(bytes, path, &[("<f4", 4), ("<f8", 8)])?;
+    let values = if array.kind == "<f4" {
+        array.data.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
+    } else {
+        array.data.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b) as f32).collect()
+    };
+    Ok((array.width, array.height, values))
+}
+
+/// The same of a mask: bytes as they are, of booleans 255 for true.
+pub(super) fn decode_mask(bytes: &[u8], path: &Path) -> Result<(u32, u32, Vec<u8>)> {
+    let array = array(bytes, path, &[("|b1", 1), ("|u1", 1)])?;
+    let is_truth = array.kind == "|b1";
+    let value = |&b: &u8| if is_truth { 255 * u8::from(b != 0) } else { b };
+    Ok((array.width, array.height, array.data.iter().map(value).collect()))
+}
+
+/// Whether these are the first bytes of such a file.
+pub(super) fn is_npy(bytes: &[u8]) -> bool {
+    bytes.starts_with(MAGIC)
+}
+
+const MAGIC: &[u8] = b"\x93NUMPY";
+
+struct Array<'a> {
+    width: u32,
+    height: u32,
+    kind: &'static str,
+    data: &'a [u8],
+}
+
+/// An array whose items are of one of `kinds`, each with its size in bytes.
+fn array<'a>(bytes: &'a [u8], path: &Path, kinds: &[(&'static str, usize)]) -> Result<Array<'a>> {
     let error = |field: &str, reason: String| Error::format(path, field, reason);
     let (header, data) = split(bytes)
         .ok_or_else(|| error("header", "not a whole .npy header; allowed: versions 1 to 3".into()))?;
     let missing = |key: &str| error(key, format!("missing in {header:?}"));
 
-    let descr = value_of(header, "descr").ok_or_else(|| missing("descr"))?;
-    let item = match descr.trim_matches(['\'', '"', ' ']) {
-        "<f4" => 4,
-        "<f8" => 8,
-        other => return Err(error("descr", format!("{other:?}; allowed: '<f4' or '<f8'"))),
+    let descr = value_of(header, "descr").ok_or_else(|| missing("descr"))?.trim_matches(['\'', '"', ' ']);
+    let Some(&(kind, item)) = kinds.iter().find(|kind| kind.0 == descr) else {
+        let allowed: Vec<String> = kinds.iter().map(|kind| format!("'{}'", kind.0)).collect();
+        return Err(error("descr", format!("{descr:?}; allowed: {}", allowed.join(" or "))));
     };
     match value_of(header, "fortran_order").ok_or_else(|| missing("fortran_order"))?.trim() {
         "False" => {}
@@ -44,17 +77,12 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<(u32, u32, Vec<f32>)> 
     if data.len() != expected {
         return Err(error("data", format!("{} bytes; the shape needs {expected}", data.len())));
     }
-    let values = if item == 4 {
-        data.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
-    } else {
-        data.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b) as f32).collect()
-    };
-    Ok((width, height, values))
+    Ok(Array { width, height, kind, data })
 }
 
 /// Header text and data.
 fn split(bytes: &[u8]) -> Option<(&str, &[u8])> {
-    let rest = bytes.strip_prefix(b"\x93NUMPY")?;
+    let rest = bytes.strip_prefix(MAGIC)?;
     let (version, rest) = rest.split_at_checked(2)?;
     let (length, rest) = match version[0] {
         1 => {
@@ -104,6 +132,15 @@ mod tests {
         bytes.extend(header.as_bytes());
         bytes.extend(data);
         bytes
+    }
+
+    #[test]
+    fn masks_are_booleans_or_bytes() {
+        let header = |descr| format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (1, 3), }}");
+        let decode = |descr| decode_mask(&file(1, &header(descr), &[0, 1, 200]), Path::new("m.npy"));
+        assert_eq!(decode("|b1").unwrap(), (3, 1, vec![0, 255, 255]));
+        assert_eq!(decode("|u1").unwrap(), (3, 1, vec![0, 1, 200]));
+        assert!(decode("<f4").unwrap_err().to_string().contains("'|b1' or '|u1'"));
     }
 
     #[test]

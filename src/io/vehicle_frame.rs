@@ -44,25 +44,98 @@ pub fn parse_vehicle_from_world(bytes: &[u8], path: &Path) -> Result<Similarity>
     Similarity::from_row_major(FIELD, &matrix).map_err(|e| in_file(path, e))
 }
 
+/// Reads the same, or a plain text of 16 numbers, row-major, with blanks or commas between.
+pub fn read_matrix(path: &Path) -> Result<Similarity> {
+    parse_matrix(&read_limited(path, MAX_FILE)?, path)
+}
+
+/// The same from bytes; `path` is for messages only.
+pub fn parse_matrix(bytes: &[u8], path: &Path) -> Result<Similarity> {
+    if matches!(bytes.trim_ascii_start().first(), Some(b'{' | b'[' | 0xef)) {
+        return parse_vehicle_from_world(bytes, path);
+    }
+    let error = |reason: String| Error::format(path, "matrix", reason);
+    let text =
+        std::str::from_utf8(bytes).map_err(|_| error("not a text; allowed: JSON or 16 numbers".into()))?;
+    let words = text.split(|c: char| c.is_whitespace() || c == ',').filter(|word| !word.is_empty());
+    let number = |word: &str| {
+        let shown: String = word.chars().take(20).collect();
+        word.parse::<f64>().map_err(|_| error(format!("{shown:?}; allowed: 16 numbers")))
+    };
+    // One more than allowed is enough to know that there are too many.
+    let numbers: Vec<f64> = words.take(17).map(number).collect::<Result<_>>()?;
+    let found = numbers.len();
+    let matrix: [f64; 16] = numbers.try_into().map_err(|_| {
+        let found = if found > 16 { "more than 16".to_owned() } else { found.to_string() };
+        error(format!("{found} numbers; allowed: 16, row-major, blanks or commas between"))
+    })?;
+    Similarity::from_row_major("matrix", &matrix).map_err(|e| in_file(path, e))
+}
+
+/// How well a similarity fits what it was found from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FitQuality {
+    /// Typical distance of what should coincide, metres.
+    pub residual_m: f64,
+    /// 0 to 1.
+    pub confidence: f64,
+}
+
 /// Writes the file that [`read_vehicle_from_world`] reads.
 pub fn write_vehicle_from_world(path: &Path, vehicle_from_world: &Similarity) -> Result<()> {
+    write_alignment(path, vehicle_from_world, None)
+}
+
+/// The same with how well it fits, which readers pass over; `null` where nobody measured it.
+pub fn write_alignment(
+    path: &Path,
+    vehicle_from_world: &Similarity,
+    quality: Option<FitQuality>,
+) -> Result<()> {
     let m = vehicle_from_world.to_row_major();
     if !m.iter().all(|v| v.is_finite()) {
         return Err(Error::argument("vehicle_from_world", "a NaN or infinite entry", "finite numbers"));
     }
     let rows: Vec<String> =
         m.chunks_exact(4).map(|r| format!("    [{:?}, {:?}, {:?}, {:?}]", r[0], r[1], r[2], r[3])).collect();
-    let text = format!("{{\n  \"vehicle_from_world\": [\n{}\n  ]\n}}\n", rows.join(",\n"));
+    let number = |value: Option<f64>| {
+        let value = value.filter(|v| v.is_finite());
+        value.map_or_else(|| "null".to_owned(), |v| format!("{v:?}"))
+    };
+    let text = format!(
+        "{{\n  \"vehicle_from_world\": [\n{}\n  ],\n  \"scale\": {:?},\n  \"residual_m\": {},\n  \"confidence\": {}\n}}\n",
+        rows.join(",\n"),
+        vehicle_from_world.scale,
+        number(quality.map(|q| q.residual_m)),
+        number(quality.map(|q| q.confidence)),
+    );
     write_atomically(path, |out| out.write_all(text.as_bytes()))
 }
 
 /// A similarity found from camera centres, and how well it fits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alignment {
-    /// The least-squares similarity.
+    /// The least-squares similarity of the cameras kept.
     pub vehicle_from_world: Similarity,
     /// How far each camera's centre ends from where it was measured, metres, in the order given.
     pub residuals: Vec<f64>,
+    /// Whether a camera agrees with the others and was used.
+    pub kept: Vec<bool>,
+}
+
+impl Alignment {
+    /// Root mean square residual of the cameras kept, metres; and as confidence the share of the cameras that were
+    /// kept, of those beyond the three that any similarity fits: 0 for three cameras, which contradict nothing.
+    pub fn quality(&self) -> FitQuality {
+        let kept: Vec<f64> =
+            self.residuals.iter().zip(&self.kept).filter(|(_, kept)| **kept).map(|(r, _)| *r).collect();
+        let squares = kept.iter().map(|r| r * r).sum::<f64>();
+        let spare = |n: usize| n.saturating_sub(3) as f64;
+        FitQuality {
+            residual_m: (squares / kept.len().max(1) as f64).sqrt(),
+            confidence: spare(kept.len()) / spare(self.residuals.len()).max(1.0),
+        }
+    }
 }
 
 /// Reads camera centres in the vehicle's frame, metres: `{"000.png": [x, y, z], ...}`.
@@ -76,18 +149,17 @@ pub fn parse_known_centers(bytes: &[u8], path: &Path) -> Result<Vec<(String, DVe
     Ok(centers.into_iter().map(|(name, center)| (name, DVec3::from_array(center))).collect())
 }
 
-/// The similarity that best takes the camera centres of the scene at `path` to known ones (Umeyama 1991). Cameras
-/// are known by name as in [`super::SceneOptions::views`]; at least three, not on one line.
+/// The similarity that best takes the camera centres of the scene at `path` to known ones; wrong ones are left out
+/// ([`Similarity::umeyama_robust`]). Cameras are known by name as in [`super::SceneOptions::views`]; at least three, not
+/// on one line.
 pub fn vehicle_from_known_centers(path: &Path, known: &[(String, DVec3)]) -> Result<Alignment> {
     let listing = listing::list(path, None)?;
     let names: Vec<String> = known.iter().map(|(name, _)| name.clone()).collect();
     let chosen = select::select(&listing.views, &names)?;
     let centers: Vec<DVec3> = chosen.into_iter().map(|i| listing.views[i].camera.center()).collect();
     let targets: Vec<DVec3> = known.iter().map(|(_, center)| *center).collect();
-    let vehicle_from_world = Similarity::umeyama(&centers, &targets)?;
-    let residual = |(from, to): (&DVec3, &DVec3)| vehicle_from_world.transform_point(*from).distance(*to);
-    let residuals = centers.iter().zip(&targets).map(residual).collect();
-    Ok(Alignment { vehicle_from_world, residuals })
+    let fit = Similarity::umeyama_robust(&centers, &targets)?;
+    Ok(Alignment { vehicle_from_world: fit.similarity, residuals: fit.residuals, kept: fit.kept })
 }
 
 #[cfg(test)]
@@ -115,6 +187,27 @@ mod tests {
         let path = dir.path().join("v.json");
         write_vehicle_from_world(&path, &first).unwrap();
         assert_eq!(read_vehicle_from_world(&path).unwrap(), first);
+        write_alignment(&path, &first, Some(FitQuality { residual_m: 0.01, confidence: 0.9 })).unwrap();
+        assert_eq!(read_vehicle_from_world(&path).unwrap(), first);
+    }
+
+    #[test]
+    fn a_matrix_is_json_or_sixteen_numbers_of_a_similarity() {
+        let parse = |text: &str| parse_matrix(text.as_bytes(), Path::new("m.txt"));
+        let found = parse("0 -2 0 1.5\n2, 0, 0, -1\n0 0 2 2.5e-1\n0 0 0 1\n").unwrap();
+        assert_eq!(found, parse("[[0,-2,0,1.5],[2,0,0,-1],[0,0,2,0.25],[0,0,0,1]]").unwrap());
+        for (bad, cause) in [
+            ("", "0 numbers"),
+            ("1 2 3", "3 numbers"),
+            ("0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 1", "more than 16"),
+            ("1 0 0 0 0 one", "\"one\""),
+            ("1 0 0 0 0 1 0 0 0 0 -1 0 0 0 0 1", "determinant > 0"),
+            ("1 0 0 0 0 2 0 0 0 0 1 0 0 0 0 1", "matrix"),
+            ("nan 0 0 0 0 2 0 0 0 0 1 0 0 0 0 1", "matrix"),
+        ] {
+            let error = parse(bad).unwrap_err().to_string();
+            assert!(error.contains(cause) && error.contains("m.txt"), "{bad}: {error}");
+        }
     }
 
     #[test]

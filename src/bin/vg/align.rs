@@ -1,34 +1,158 @@
-//! `vg align`: the similarity from a scene's world to the vehicle's frame, from camera centres somebody measured.
+//! `vg align`: the similarity from a scene's world to the vehicle's frame, from a scan, from camera centres somebody
+//! measured, from the vehicle's size, or from a matrix.
 
-use crate::args::AlignArgs;
-use crate::files;
+use crate::args::{AlignArgs, Mode};
 use crate::job::{Failure, Outcome, Result};
+use crate::{cloud, files};
 use std::fmt::Write;
-use vg::io;
+use std::path::{Path, PathBuf};
+use vg::Error;
+use vg::align::{FEWEST_VIEWS, to_box, to_scan};
+use vg::geometry::Similarity;
+use vg::io::{self, FitQuality, MaskedViews};
 
 /// Fewer centres leave the turn about their line open.
 const FEWEST: usize = 3;
 
-/// Fits, writes, and says how well it fits.
+/// A similarity, how well it fits, and what else there is to say, a line each.
+struct Found {
+    vehicle_from_world: Similarity,
+    quality: Option<FitQuality>,
+    lines: Vec<String>,
+}
+
+/// Finds, writes, and says how well it fits.
 pub(crate) fn run(args: &AlignArgs) -> Result {
-    let known = io::read_known_centers(&args.known_centers)?;
+    let mode = args.mode();
+    let scan = match mode {
+        Mode::Scan(named) => Some(scan_of(&args.scene, named)?),
+        _ => None,
+    };
+    let input = match mode {
+        Mode::Scan(_) | Mode::Box(_) => scan.clone(),
+        Mode::Centers(path) | Mode::Matrix(path) => Some(path.to_owned()),
+    };
+    files::refuse_clashes(std::slice::from_ref(&args.output), input.as_slice())?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
+    let pool = pool.map_err(|e| Failure::job(format!("--threads {}: {e}", args.threads)))?;
+    let found = pool.install(|| match mode {
+        Mode::Scan(_) => by_scan(args, scan.as_deref().unwrap_or(Path::new(""))),
+        Mode::Centers(path) => by_centers(args, path),
+        Mode::Box(size) => by_box(args, size),
+        Mode::Matrix(path) => by_matrix(args, path),
+    })?;
+    files::prepare(&args.output)?;
+    io::write_alignment(&args.output, &found.vehicle_from_world, found.quality)?;
+    let mut text = format!("{}: scale {:.6}", args.output.display(), found.vehicle_from_world.scale);
+    if let Some(quality) = found.quality {
+        let _ = write!(text, ", residual {:.4} m, confidence {:.2}", quality.residual_m, quality.confidence);
+    }
+    found.lines.iter().for_each(|line| {
+        let _ = write!(text, "\n  {line}");
+    });
+    Ok(Outcome::done(text))
+}
+
+/// The scan that was named, or the one in the scene's folder.
+fn scan_of(scene: &Path, named: Option<&Path>) -> Result<PathBuf> {
+    match named {
+        Some(path) => Ok(path.to_owned()),
+        None => io::find_scan(scene)?.ok_or_else(|| {
+            let scene = scene.display();
+            Failure::job(format!(
+                "--scan: {scene} holds no scan; expected a file name, or one PLY file in 3dscanner_origin or in \
+                 colmap_processed/pcd_rescale"
+            ))
+        }),
+    }
+}
+
+fn by_scan(args: &AlignArgs, path: &Path) -> Result<Found> {
+    let cloud = cloud::read(path)?;
+    let scene = masked(args)?;
+    let found = to_scan(&scene.views, &scene.points, &cloud, args.heading());
+    let found = found.map_err(|e| named(e, args, path))?;
+    let mut lines = vec![masks_line(found.views, &scene)];
+    lines.push(format!(
+        "outlines differ by {:.2} pixels on average, the other way round by {:.2}",
+        found.residual_px, found.other_px
+    ));
+    lines.push(format!("{} sparse points lie on the scan, to {:.4} m", found.points, found.points_m));
+    let quality = FitQuality { residual_m: found.residual_m, confidence: found.confidence };
+    Ok(Found { vehicle_from_world: found.vehicle_from_world, quality: Some(quality), lines })
+}
+
+fn by_box(args: &AlignArgs, size: [f64; 3]) -> Result<Found> {
+    let scene = masked(args)?;
+    let found = to_box(&scene.views, &scene.points, size, args.heading());
+    let found = found.map_err(|e| named(e, args, Path::new("")))?;
+    let [l, w, h] = found.found_m;
+    let lines = vec![
+        masks_line(found.views, &scene),
+        format!("the masks' hull measures {l:.3} x {w:.3} x {h:.3} m"),
+        format!("front from {}", found.asked_view),
+    ];
+    let quality = FitQuality { residual_m: found.residual_m, confidence: found.confidence };
+    Ok(Found { vehicle_from_world: found.vehicle_from_world, quality: Some(quality), lines })
+}
+
+fn by_centers(args: &AlignArgs, path: &Path) -> Result<Found> {
+    let known = io::read_known_centers(path)?;
     if known.len() < FEWEST {
-        let (path, n) = (args.known_centers.display(), known.len());
+        let (path, n) = (path.display(), known.len());
         return Err(Failure::job(format!(
             "{path}: {n} camera centres; expected at least {FEWEST}, not on one line"
         )));
     }
     let alignment = io::vehicle_from_known_centers(&args.scene, &known)?;
-    files::refuse_clashes(std::slice::from_ref(&args.output), std::slice::from_ref(&args.known_centers))?;
-    files::prepare(&args.output)?;
-    io::write_vehicle_from_world(&args.output, &alignment.vehicle_from_world)?;
+    let pairs = known.iter().zip(alignment.residuals.iter().zip(&alignment.kept));
+    let line = |((name, _), (residual, kept)): (&(String, _), (&f64, &bool))| {
+        format!("{name}: {residual:.4} m{}", if *kept { "" } else { ", left out: it contradicts the others" })
+    };
+    let quality = Some(alignment.quality());
+    Ok(Found { vehicle_from_world: alignment.vehicle_from_world, quality, lines: pairs.map(line).collect() })
+}
 
-    let residuals = &alignment.residuals;
-    let rms = (residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64).sqrt();
-    let scale = alignment.vehicle_from_world.scale;
-    let mut text = format!("{}: scale {scale:.6}, rms residual {rms:.4} m", args.output.display());
-    for ((name, _), residual) in known.iter().zip(residuals) {
-        let _ = write!(text, "\n  {name}: {residual:.4} m");
+fn by_matrix(args: &AlignArgs, path: &Path) -> Result<Found> {
+    // A name that is no scene is a slip worth telling.
+    let options = io::SceneOptions { vehicle_from_world: Some(io::read_matrix(path)?), ..Default::default() };
+    io::list_scene(&args.scene, &options)?;
+    let vehicle_from_world = options.vehicle_from_world.unwrap_or(Similarity::IDENTITY);
+    Ok(Found { vehicle_from_world, quality: None, lines: Vec::new() })
+}
+
+fn masked(args: &AlignArgs) -> Result<MaskedViews> {
+    let scene = io::read_masked(&args.scene)?;
+    if scene.views.len() < FEWEST_VIEWS {
+        return Err(Failure::job(format!(
+            "{}: {} of {} views have a mask; expected at least {FEWEST_VIEWS}, masks/<name of the picture>.png",
+            args.scene.display(),
+            scene.views.len(),
+            scene.views.len() + scene.unmasked
+        )));
     }
-    Ok(Outcome::done(text))
+    Ok(scene)
+}
+
+fn masks_line(used: usize, scene: &MaskedViews) -> String {
+    match scene.views.len() + scene.unmasked - used {
+        0 => format!("{used} masks"),
+        without => format!("{used} masks; {without} views without one were left out"),
+    }
+}
+
+/// The library's argument as the user wrote it.
+fn named(error: Error, args: &AlignArgs, scan: &Path) -> Failure {
+    match error {
+        Error::Argument { argument, found, allowed } => {
+            Failure::job(match argument.as_str() {
+                "heading" => format!("--heading: {found}; allowed: {allowed}"),
+                "scan" => format!("--scan {}: {found}; allowed: {allowed}", scan.display()),
+                "size" => format!("--box: {found}; allowed: {allowed}"),
+                "sparse" => format!("--box: {}: {found}; allowed: {allowed}", args.scene.display()),
+                other => format!("{}: {other}: {found}; allowed: {allowed}", args.scene.display()),
+            })
+        }
+        other => other.into(),
+    }
 }

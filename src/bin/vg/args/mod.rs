@@ -1,8 +1,10 @@
 //! The command line: commands and their options.
 
+mod align;
 mod method;
 mod values;
 
+pub(crate) use align::{AlignArgs, Mode};
 pub(crate) use method::MethodArgs;
 
 use clap::{Args, Parser, Subcommand};
@@ -38,7 +40,7 @@ pub(crate) enum Command {
     Pareto(ParetoArgs),
     /// Run the whole job on the sample inside this program
     Demo(DemoArgs),
-    /// Find the similarity from a scene's world to the vehicle's frame, from known camera centres
+    /// Find the similarity from a scene's world to the vehicle's frame: by a scan, camera centres, a box, or a matrix
     Align(AlignArgs),
 }
 
@@ -238,16 +240,4 @@ pub(crate) struct DemoArgs {
     /// Worker threads; 0 means one per core
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) threads: usize,
-}
-
-#[derive(Args)]
-pub(crate) struct AlignArgs {
-    /// The scene, usually a COLMAP folder
-    pub(crate) scene: PathBuf,
-    /// Camera centres in the vehicle's frame, metres: {"000.jpg": [x, y, z], ...}, at least three
-    #[arg(long, value_name = "CENTERS.json")]
-    pub(crate) known_centers: PathBuf,
-    /// The similarity, for --vehicle-from-world
-    #[arg(short, long, value_name = "FILE")]
-    pub(crate) output: PathBuf,
 }

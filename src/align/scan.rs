@@ -1,0 +1,141 @@
+//! The scan, made ready: strays dropped, noise taken off, a normal for every point, and the points that can ever be
+//! outermost.
+
+use super::tree::Tree;
+use crate::error::{Error, Result};
+use crate::scene::Cloud;
+use glam::{DVec3, Vec3};
+use nalgebra::{Matrix3, SymmetricEigen};
+use rayon::prelude::*;
+
+/// More points than this say nothing new; a longer scan is thinned evenly.
+const MOST_POINTS: usize = 60_000;
+
+/// Fewer points than this are no shape.
+const FEWEST_POINTS: usize = 200;
+
+/// The plane of a point is that of so many neighbours: two or three spacings wide, within which a body panel is flat.
+const NEIGHBOURS: usize = 12;
+
+/// A point whose neighbours are this many times farther than usual is alone.
+const ALONE: f64 = 3.0;
+
+/// A point this many times farther off its neighbours' plane than usual is not of their surface.
+const OFF: f64 = 6.0;
+
+/// Sizes of a vehicle, metres: the longest side of the scan's box.
+const SIZES_M: std::ops::RangeInclusive<f64> = 1.0..=25.0;
+
+/// Directions in which the outermost points are looked for.
+const DIRECTIONS: usize = 1000;
+
+/// A scan of a vehicle in the vehicle's frame, metres.
+pub(super) struct Scan {
+    pub(super) points: Vec<DVec3>,
+    /// Unit, of either sign.
+    pub(super) normals: Vec<DVec3>,
+    pub(super) tree: Tree,
+    /// Middle of the box.
+    pub(super) center: DVec3,
+    /// The corners of the convex hull, nearly: no other point is outermost in any picture.
+    pub(super) corners: Vec<DVec3>,
+}
+
+impl Scan {
+    pub(super) fn new(cloud: &Cloud) -> Result<Self> {
+        let stride = cloud.points().len().div_ceil(MOST_POINTS);
+        let all: Vec<DVec3> =
+            cloud.points().iter().step_by(stride).map(|&p| Vec3::from_array(p).as_dvec3()).collect();
+        let dense = without_lonely(&all);
+        let (points, normals) = smoothed(&dense);
+        if points.len() < FEWEST_POINTS {
+            let found = format!("{} points, of which {} lie on a surface", all.len(), points.len());
+            return Err(Error::argument("scan", found, format!("at least {FEWEST_POINTS} on a surface")));
+        }
+        let low = points.iter().fold(DVec3::INFINITY, |m, p| m.min(*p));
+        let high = points.iter().fold(DVec3::NEG_INFINITY, |m, p| m.max(*p));
+        let size = high - low;
+        if !SIZES_M.contains(&size.max_element()) {
+            return Err(Error::argument(
+                "scan",
+                format!("a box of {:.3} x {:.3} x {:.3}", size.x, size.y, size.z),
+                format!("a vehicle in metres, {} to {} m long", SIZES_M.start(), SIZES_M.end()),
+            ));
+        }
+        let corners = corners(&points);
+        let tree = Tree::new(&points);
+        Ok(Self { points, normals, tree, center: 0.5 * (low + high), corners })
+    }
+}
+
+fn without_lonely(points: &[DVec3]) -> Vec<DVec3> {
+    let tree = Tree::new(points);
+    let reach = |p: &DVec3| tree.neighbours(*p, NEIGHBOURS / 2).last().map_or(0.0, |n| n.0.sqrt());
+    let reaches: Vec<f64> = points.par_iter().map(reach).collect();
+    let limit = ALONE * median(&reaches);
+    points.iter().zip(&reaches).filter(|(_, r)| **r <= limit).map(|(p, _)| *p).collect()
+}
+
+/// Each point moved to the plane of its neighbours, with that plane's normal; without those far off it.
+fn smoothed(points: &[DVec3]) -> (Vec<DVec3>, Vec<DVec3>) {
+    let tree = Tree::new(points);
+    let plane = |p: &DVec3| {
+        let around: Vec<DVec3> =
+            tree.neighbours(*p, NEIGHBOURS).iter().map(|n| points[n.1 as usize]).collect();
+        let others = &around[1.min(around.len())..];
+        let (middle, normal) = plane_of(others);
+        let off = normal.dot(*p - middle);
+        // The point is one of the witnesses of where the surface is.
+        let moved = *p - off * normal * (others.len() as f64 / around.len().max(1) as f64);
+        (moved, normal, off.abs())
+    };
+    let planes: Vec<(DVec3, DVec3, f64)> = points.par_iter().map(plane).collect();
+    let offs: Vec<f64> = planes.iter().map(|p| p.2).collect();
+    let limit = OFF * median(&offs) + 1e-6;
+    planes.into_iter().filter(|p| p.2 <= limit && p.1.is_finite()).map(|(p, n, _)| (p, n)).unzip()
+}
+
+/// Middle and unit normal of the plane through points.
+pub(super) fn plane_of(points: &[DVec3]) -> (DVec3, DVec3) {
+    let middle = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
+    let mut spread = Matrix3::zeros();
+    for p in points {
+        let d = *p - middle;
+        spread += Matrix3::from_fn(|row, column| d[row] * d[column]);
+    }
+    (middle, smallest_axis(spread))
+}
+
+/// The direction in which a symmetric matrix is smallest.
+pub(super) fn smallest_axis(matrix: Matrix3<f64>) -> DVec3 {
+    let eigen = SymmetricEigen::new(matrix);
+    let k = eigen.eigenvalues.imin();
+    DVec3::new(eigen.eigenvectors[(0, k)], eigen.eigenvectors[(1, k)], eigen.eigenvectors[(2, k)])
+}
+
+/// The outermost points in directions spread evenly (a Fibonacci sphere).
+fn corners(points: &[DVec3]) -> Vec<DVec3> {
+    let golden = std::f64::consts::PI * (3.0 - 5.0f64.sqrt());
+    let outermost = |k: usize| {
+        let z = 1.0 - (2 * k + 1) as f64 / DIRECTIONS as f64;
+        let (s, c) = (golden * k as f64).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        let d = DVec3::new(r * c, r * s, z);
+        let farthest = |a: usize, b: usize| if points[b].dot(d) > points[a].dot(d) { b } else { a };
+        (0..points.len()).reduce(farthest).unwrap_or(0)
+    };
+    let mut indices: Vec<usize> = (0..DIRECTIONS).into_par_iter().map(outermost).collect();
+    indices.sort_unstable();
+    indices.dedup();
+    indices.into_iter().map(|i| points[i]).collect()
+}
+
+/// The middle value; 0 of none.
+pub(super) fn median(values: &[f64]) -> f64 {
+    let mut values = values.to_vec();
+    let middle = values.len() / 2;
+    match values.len() {
+        0 => 0.0,
+        _ => *values.select_nth_unstable_by(middle, f64::total_cmp).1,
+    }
+}
