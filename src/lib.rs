@@ -20,6 +20,7 @@ pub mod error;
 pub mod gaussians;
 pub mod geometry;
 pub mod head;
+pub mod imports;
 pub mod io;
 pub mod metrics;
 pub mod onnx;

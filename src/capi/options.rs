@@ -250,6 +250,7 @@ impl vg_options {
             resolution: self.resolution,
             max_views: (self.max_views != 0).then_some(self.max_views),
             baseline: None,
+            ignore_offset: false,
             points: read::flag("options.points", self.points)?,
             threads: 0,
         })

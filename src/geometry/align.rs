@@ -46,6 +46,12 @@ impl Similarity {
         [r[0], r[1], r[2], t.x, r[3], r[4], r[5], t.y, r[6], r[7], r[8], t.z, 0.0, 0.0, 0.0, 1.0]
     }
 
+    /// Its inverse.
+    pub fn inverse(&self) -> Self {
+        let (scale, rotation) = (self.scale.recip(), self.rotation.transpose());
+        Self { scale, rotation, translation: -scale * (rotation * self.translation) }
+    }
+
     /// A point.
     pub fn transform_point(&self, p: DVec3) -> DVec3 {
         self.scale * (self.rotation * p) + self.translation

@@ -41,6 +41,12 @@ impl NetworkHead {
         let contract = Contract::read(model.ports()).map_err(|b| model.broken(b.field, b.reason))?;
         Ok(Self { model, contract, sh_degree: sh_degree.min(SH_DEGREE) })
     }
+
+    /// Its offsets are left out, whatever its file says (the paper's ablation).
+    pub fn without_offset(mut self) -> Self {
+        self.contract.offset = Offset::Ignored;
+        self
+    }
 }
 
 impl Contract {

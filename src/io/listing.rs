@@ -63,10 +63,15 @@ pub(super) fn list(path: &Path, format: Option<SceneFormat>) -> Result<Listing> 
     if transforms.is_file() && format != Some(SceneFormat::Colmap) {
         return list_transforms(&transforms);
     }
-    match colmap::find_model(path).or_else(|| realcar::find_model(path)) {
+    match find_colmap(path) {
         Some(model) if format != Some(SceneFormat::Transforms) => list_colmap(path, &model),
         _ => Err(Error::format(path, "scene", NO_SCENE)),
     }
+}
+
+/// The folder of the COLMAP model at or below `path`.
+pub(super) fn find_colmap(path: &Path) -> Option<PathBuf> {
+    colmap::find_model(path).or_else(|| realcar::find_model(path))
 }
 
 const NO_SCENE: &str = "neither a transforms.json, nor a folder with one, nor a folder with a COLMAP model (cameras.bin and images.bin, or .txt, in sparse/0, in sparse, in itself, or as 3DRealCar has it in colmap_processed/pcd_rescale)";

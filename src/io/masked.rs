@@ -1,5 +1,6 @@
 //! A scene's masks without its pictures, in the scene's own world: what alignment needs.
 
+use super::scene::SceneFormat;
 use super::{colmap, image, listing};
 use crate::error::{Error, Result};
 use crate::scene::view::MAX_VIEWS;
@@ -20,9 +21,10 @@ pub struct MaskedViews {
 }
 
 /// Reads cameras, masks (files, else the pictures' alpha) and sparse points of the scene at `path`. Views without a
-/// mask are left out.
+/// mask are left out. Of a folder with both, the COLMAP model is read and not the `transforms.json`: it is the one whose
+/// world says nothing.
 pub fn read_masked(path: &Path) -> Result<MaskedViews> {
-    let mut listing = listing::list(path, None)?;
+    let mut listing = listing::list(path, colmap_format(path))?;
     listing.views.sort_by(|a, b| a.name.cmp(&b.name));
     if listing.views.len() > MAX_VIEWS {
         return Err(Error::argument("views", listing.views.len().to_string(), format!("1 to {MAX_VIEWS}")));
@@ -35,6 +37,11 @@ pub fn read_masked(path: &Path) -> Result<MaskedViews> {
     };
     let points = points.into_iter().map(DVec3::from_array).collect();
     Ok(MaskedViews { unmasked: listing.views.len() - views.len(), views, points })
+}
+
+/// [`SceneFormat::Colmap`] where a COLMAP model is at or below `path`.
+pub fn colmap_format(path: &Path) -> Option<SceneFormat> {
+    listing::find_colmap(path).map(|_| SceneFormat::Colmap)
 }
 
 fn read_view(listed: &listing::ListedView) -> Result<Option<View>> {

@@ -23,7 +23,7 @@ pub mod transforms;
 pub mod vehicle_frame;
 
 pub use files::write_atomically;
-pub use masked::{MaskedViews, read_masked};
+pub use masked::{MaskedViews, colmap_format, read_masked};
 pub use realcar::find_scan;
 pub use scene::{
     NamedCamera, SceneFiles, SceneFormat, SceneIndex, SceneOptions, SceneView, list_scene, open_scene,

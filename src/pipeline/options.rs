@@ -73,6 +73,8 @@ pub struct Options {
     pub prior_model: Option<Model>,
     /// A Gaussian head, see [`crate::head::network`]; `None` for the surfel head, which needs no weights.
     pub head_model: Option<Model>,
+    /// Leave out the offsets that `head_model` answers (the paper's ablation), whatever the model was trained with.
+    pub ignore_offset: bool,
     /// Whether cameras are corrected where the silhouettes contradict them.
     pub calibrate: Calibrate,
     /// When Gaussians are cloned across y = 0.
@@ -113,6 +115,7 @@ impl Default for Options {
             prior: PriorChoice::Auto,
             prior_model: None,
             head_model: None,
+            ignore_offset: false,
             calibrate: Calibrate::Auto,
             symmetry: SymmetryMode::Auto,
             relight: Relight::Auto,

@@ -124,7 +124,10 @@ pub fn reconstruct_on<'a>(
     context.report("head", 0.0)?;
     let degree = plan::sh_degree(&views, &geometry, options, &mut left_out);
     let head: Box<dyn GaussianHead> = match &options.head_model {
-        Some(model) => Box::new(NetworkHead::new(model.clone(), degree)?),
+        Some(model) => {
+            let head = NetworkHead::new(model.clone(), degree)?;
+            Box::new(if options.ignore_offset { head.without_offset() } else { head })
+        }
         None => Box::new(SurfelHead::new(degree)),
     };
     let gaussians = head.predict(&views, &geometry, &kept, &context)?;

@@ -130,3 +130,153 @@ fn clouds_that_make_no_sense_are_errors() {
     fail(at, "reconstruct . -o {}/a.ply --prior hull --cloud {}/empty.ply", 1, &["empty.ply"]);
     fail(at, "reconstruct . -o {}/nan.ply --prior hull --cloud {}/nan.ply", 1, &["would be replaced"]);
 }
+
+#[test]
+fn a_table_has_a_row_for_each_system_and_says_why_one_is_empty() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let words = "eval . --table symmetry --with --prior=hull --repeat 2 --json {}/e.json --markdown {}/e.md";
+    let out = succeed(at, words).out;
+    assert_eq!(out.lines().count(), 5, "{out}");
+    let document = json(&at.join("e.json"));
+    let systems = document["systems"].as_array().unwrap();
+    let of = |name: &str| systems.iter().find(|s| s["system"].as_str().unwrap().starts_with(name)).unwrap();
+    let psnr = |name: &str| of(name)["psnr_db"].as_f64().unwrap();
+    // Nothing stands where the unseen side was.
+    assert!(
+        psnr("Gaussian cloning") > psnr("neither") + 2.0 && psnr("image flipping") > psnr("neither") + 2.0
+    );
+    for system in systems {
+        assert_eq!((system["splits"].as_u64(), system["each"].as_array().unwrap().len()), (Some(1), 1));
+        assert_eq!(system["each"][0]["seconds"].as_array().unwrap().len(), 2);
+        assert!(!cfg!(target_os = "linux") || system["peak_bytes"].as_u64().unwrap() > 1 << 20, "{system}");
+    }
+    let markdown = fs::read_to_string(at.join("e.md")).unwrap();
+    assert!(markdown.starts_with("| system | splits |") && markdown.lines().count() == 6, "{markdown}");
+
+    let out = succeed(at, "eval . --table activation --json {}/a.json").out;
+    assert!(out.contains("\nrelu: needs heads trained with it: --head-model"), "{out}");
+    assert_eq!(json(&at.join("a.json"))["systems"][2]["missing"].as_array().unwrap().len(), 1);
+}
+
+#[test]
+fn the_side_table_looks_from_everywhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(
+        at.join("both.json"),
+        r#"{"r": {"input": ["000","001","002","003"], "test": ["004","005"]},
+            "l": {"input": ["004","005","006","007"], "test": ["000","001"]}}"#,
+    )
+    .unwrap();
+    let words = "eval . --table side --split {}/both.json --with --prior=hull --json {}/e.json";
+    succeed(at, words);
+    let systems = json(&at.join("e.json"))["systems"].clone();
+    let views = |row: usize| -> Vec<String> {
+        let views = systems[row]["each"][0]["views"].as_array().unwrap().iter();
+        views.map(|v| v["name"].as_str().unwrap().to_owned()).collect()
+    };
+    assert_eq!(
+        (views(0), views(1)),
+        (vec!["000.png".into(), "001.png".into()], vec!["004.png".into(), "005.png".into()])
+    );
+    // Every split's test views, but those that are shown.
+    assert_eq!(views(2), ["000.png", "001.png"]);
+    assert_eq!(systems[0]["each"][0]["split"], "l");
+}
+
+#[test]
+fn a_folder_of_vehicles_with_faults_is_measured_as_far_as_it_goes() {
+    let set = tempfile::tempdir().unwrap();
+    let parts = ["images", "masks", "depth", "split.json", "transforms.json"];
+    for name in ["a_good", "b_no_mask", "c_wrong_size", "d_empty_sparse", "e_no_picture"] {
+        parts.iter().for_each(|part| copy(&sample().join(part), &set.path().join(name).join(part)));
+    }
+    fs::create_dir(set.path().join("notes")).unwrap();
+    let at = |path: &str| set.path().join(path);
+    fs::remove_dir_all(at("b_no_mask/masks")).unwrap();
+    let scene = fs::read_to_string(at("b_no_mask/transforms.json")).unwrap();
+    fs::write(at("b_no_mask/transforms.json"), scene.replace("mask_path", "no_mask_path")).unwrap();
+    image::RgbImage::new(10, 10).save(at("c_wrong_size/images/001.png")).unwrap();
+    fs::remove_file(at("d_empty_sparse/transforms.json")).unwrap();
+    fs::create_dir_all(at("d_empty_sparse/sparse/0")).unwrap();
+    fs::remove_file(at("e_no_picture/images/005.png")).unwrap();
+
+    let run = vg_in(set.path(), "eval {} --prior hull --json {}/e.json");
+    assert_eq!(run.code, 1);
+    let lines: Vec<&str> = run.err.lines().collect();
+    assert_eq!(lines.len(), 4, "{run:?}");
+    for (line, causes) in lines.iter().zip([
+        ["b_no_mask", "mask"],
+        ["c_wrong_size", "001.png"],
+        ["d_empty_sparse", "sparse/0"],
+        ["e_no_picture", "005.png"],
+    ]) {
+        assert!(causes.iter().all(|cause| line.contains(cause)), "{causes:?}: {line}");
+    }
+    assert!(run.out.contains("a_good  right_to_left") && run.out.lines().count() == 2, "{run:?}");
+    assert_eq!(json(&at("e.json"))["errors"].as_array().unwrap().len(), 4);
+
+    // Several systems: a fault of the pictures is told once for a vehicle, a method's own where it is met.
+    let run = vg_in(set.path(), "eval {} --table symmetry --with --prior=hull --json {}/t.json");
+    assert_eq!((run.code, run.err.lines().count()), (1, 4), "{run:?}");
+    let systems = json(&at("t.json"))["systems"].clone();
+    assert_eq!((systems[0]["splits"].as_u64(), systems[3]["splits"].as_u64()), (Some(1), Some(1)));
+}
+
+#[test]
+fn models_of_other_programs_are_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::create_dir(at.join("sedan")).unwrap();
+    fs::copy(asset(), at.join("sedan/right_to_left.ply")).unwrap();
+    let import = "ours again: vehicle {}/{scene}/{split}.ply seconds=2.5"
+        .replace("{}/", &format!("{}/", at.display()));
+    let missing = format!("nothing: vehicle {}/missing.ply", at.display());
+    let json_path = at.join("e.json");
+    let words = [
+        "eval",
+        ".",
+        "--system",
+        "ours: --prior shape",
+        "--import",
+        &import,
+        "--json",
+        json_path.to_str().unwrap(),
+    ];
+    let run = vg(&words);
+    assert_eq!((run.code, run.err.as_str()), (0, ""), "{run:?}");
+    let systems = json(&json_path)["systems"].clone();
+    // By way of a file: opacities and scales are stored as logits and logarithms.
+    let psnr = |i: usize| systems[i]["psnr_db"].as_f64().unwrap();
+    assert!((psnr(0) - psnr(1)).abs() < 1e-3, "{} {}", psnr(0), psnr(1));
+    assert_eq!(
+        (systems[1]["seconds"].as_f64(), systems[1]["system"].as_str()),
+        (Some(2.5), Some("ours again"))
+    );
+
+    let run = vg(&["eval", ".", "--system", "ours: --prior hull", "--import", &missing]);
+    assert!(
+        run.code == 1 && run.err.contains("missing.ply") && run.out.contains("\nnothing: sedan"),
+        "{run:?}"
+    );
+    for (import, cause) in [
+        ("no colon", "no name before a colon"),
+        ("a: da3", "no path"),
+        ("a: unheard x.ply", "no such kind"),
+        ("a: vehicle x.ply seconds=-1", "seconds is no number above 0"),
+    ] {
+        let run = vg(&["eval", ".", "--import", import]);
+        assert!(run.code == 2 && run.err.contains(cause), "{run:?}");
+    }
+    let run = vg(&["eval", ".", "--import", "a: object x.ply"]);
+    assert!(run.code == 1 && run.err.contains("needs --scan"), "{run:?}");
+}
+
+#[test]
+fn options_for_all_rows_have_their_place() {
+    let folder = Path::new(".");
+    fail(folder, "eval . --table side --prior hull", 2, &["--with"]);
+    fail(folder, "eval . --with --prior=hull", 2, &["--with without --table"]);
+    fail(folder, "eval . --table nothing", 2, &["main", "omissions"]);
+}

@@ -20,7 +20,7 @@ fn a_sweep_gives_a_table_a_plot_and_what_no_point_beats() {
     assert_eq!((said.code, said.err.as_str()), (0, ""));
     assert_eq!(said.out.lines().count(), 4, "{}", said.out);
     let rows = json(&folder.path().join("p.json"))["points"].as_array().unwrap().clone();
-    let names: Vec<&str> = rows.iter().map(|r| r["point"].as_str().unwrap()).collect();
+    let names: Vec<&str> = rows.iter().map(|r| r["system"].as_str().unwrap()).collect();
     assert_eq!(names, ["default", "coarse, \"half\"", "--max-views 1"]);
     for row in &rows {
         let number = |key: &str| row[key].as_f64().unwrap();
@@ -46,7 +46,7 @@ fn a_point_that_makes_no_sense_is_named() {
     for (point, cause) in [
         ("fast: --no-such-thing", "--point \"fast: --no-such-thing\": unexpected argument"),
         ("--sh-degree 9", "--sh-degree"),
-        ("--cloud p.ply", "--cloud is not for a sweep"),
+        ("--prior onnx", "--prior-model"),
     ] {
         let said = sweep(folder.path(), &[point]);
         assert!(said.code == 2 && said.out.is_empty() && said.err.contains(cause), "{said:?}");

@@ -78,6 +78,7 @@ pub(crate) fn reconstruct<'py>(
         points,
         refine: refinement(py, refine_iterations, refine_seconds, refine_hold_out)?,
         baseline: None,
+        ignore_offset: false,
     };
     // Before the pixels are copied.
     options.validate().map_err(|e| from_library(py, e))?;

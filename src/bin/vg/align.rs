@@ -7,7 +7,7 @@ use crate::{cloud, files};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use vg::Error;
-use vg::align::{FEWEST_VIEWS, to_box, to_scan};
+use vg::align::{FEWEST_VIEWS, Heading, ScanAlignment, to_box, to_scan};
 use vg::geometry::Similarity;
 use vg::io::{self, FitQuality, MaskedViews};
 
@@ -67,11 +67,21 @@ fn scan_of(scene: &Path, named: Option<&Path>) -> Result<PathBuf> {
     }
 }
 
+/// The similarity to a scan, of a file or of the scene's folder, and the masks it was found with.
+pub(crate) fn to_scan_of(scene: &Path, scan: Option<&Path>, heading: Heading) -> Result<ScanAlignment> {
+    Ok(by_masks(scene, &scan_of(scene, scan)?, heading)?.1)
+}
+
+fn by_masks(path: &Path, scan: &Path, heading: Heading) -> Result<(MaskedViews, ScanAlignment)> {
+    let cloud = cloud::read(scan)?;
+    let scene = masked(path)?;
+    let found = to_scan(&scene.views, &scene.points, &cloud, heading);
+    let found = found.map_err(|e| named(e, path, scan))?;
+    Ok((scene, found))
+}
+
 fn by_scan(args: &AlignArgs, path: &Path) -> Result<Found> {
-    let cloud = cloud::read(path)?;
-    let scene = masked(args)?;
-    let found = to_scan(&scene.views, &scene.points, &cloud, args.heading());
-    let found = found.map_err(|e| named(e, args, path))?;
+    let (scene, found) = by_masks(&args.scene, path, args.heading())?;
     let mut lines = vec![masks_line(found.views, &scene)];
     lines.push(format!(
         "outlines differ by {:.2} pixels on average, the other way round by {:.2}",
@@ -83,9 +93,9 @@ fn by_scan(args: &AlignArgs, path: &Path) -> Result<Found> {
 }
 
 fn by_box(args: &AlignArgs, size: [f64; 3]) -> Result<Found> {
-    let scene = masked(args)?;
+    let scene = masked(&args.scene)?;
     let found = to_box(&scene.views, &scene.points, size, args.heading());
-    let found = found.map_err(|e| named(e, args, Path::new("")))?;
+    let found = found.map_err(|e| named(e, &args.scene, Path::new("")))?;
     let [l, w, h] = found.found_m;
     let lines = vec![
         masks_line(found.views, &scene),
@@ -121,12 +131,12 @@ fn by_matrix(args: &AlignArgs, path: &Path) -> Result<Found> {
     Ok(Found { vehicle_from_world, quality: None, lines: Vec::new() })
 }
 
-fn masked(args: &AlignArgs) -> Result<MaskedViews> {
-    let scene = io::read_masked(&args.scene)?;
+fn masked(path: &Path) -> Result<MaskedViews> {
+    let scene = io::read_masked(path)?;
     if scene.views.len() < FEWEST_VIEWS {
         return Err(Failure::job(format!(
             "{}: {} of {} views have a mask; expected at least {FEWEST_VIEWS}, masks/<name of the picture>.png",
-            args.scene.display(),
+            path.display(),
             scene.views.len(),
             scene.views.len() + scene.unmasked
         )));
@@ -142,17 +152,15 @@ fn masks_line(used: usize, scene: &MaskedViews) -> String {
 }
 
 /// The library's argument as the user wrote it.
-fn named(error: Error, args: &AlignArgs, scan: &Path) -> Failure {
+fn named(error: Error, scene: &Path, scan: &Path) -> Failure {
     match error {
-        Error::Argument { argument, found, allowed } => {
-            Failure::job(match argument.as_str() {
-                "heading" => format!("--heading: {found}; allowed: {allowed}"),
-                "scan" => format!("--scan {}: {found}; allowed: {allowed}", scan.display()),
-                "size" => format!("--box: {found}; allowed: {allowed}"),
-                "sparse" => format!("--box: {}: {found}; allowed: {allowed}", args.scene.display()),
-                other => format!("{}: {other}: {found}; allowed: {allowed}", args.scene.display()),
-            })
-        }
+        Error::Argument { argument, found, allowed } => Failure::job(match argument.as_str() {
+            "heading" => format!("--heading: {found}; allowed: {allowed}"),
+            "scan" => format!("--scan {}: {found}; allowed: {allowed}", scan.display()),
+            "size" => format!("--box: {found}; allowed: {allowed}"),
+            "sparse" => format!("--box: {}: {found}; allowed: {allowed}", scene.display()),
+            other => format!("{}: {other}: {found}; allowed: {allowed}", scene.display()),
+        }),
         other => other.into(),
     }
 }

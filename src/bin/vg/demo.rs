@@ -2,6 +2,7 @@
 
 use crate::args::DemoArgs;
 use crate::contact::{self, Tile};
+use crate::eval::judge::OfVehicle;
 use crate::eval::measure::{self, Measured, Shown};
 use crate::eval::split;
 use crate::job::{Failure, Outcome, Result};
@@ -30,7 +31,8 @@ pub(crate) fn run(args: &DemoArgs) -> Result {
     let made = reconstruct::reconstruct(&inputs.scene, &shape)?;
 
     let tests = scene::open(&scene_folder, &split.test, &without_depth)?;
-    let (drawn, measured) = measure::judge(&made, &tests.scene.views, args.threads)?;
+    let (drawn, mut measured) = measure::judge(&made.gaussians, &tests.scene.views, args.threads)?;
+    measured.reconstruct_ms = Some(made.report.total_ms);
     ply::write(&folder.join("asset.ply"), &made.gaussians)?;
     if let Some(cloud) = &made.points {
         ply::write_points(&folder.join("points.ply"), &cloud.positions, &cloud.colors)?;
@@ -48,8 +50,8 @@ pub(crate) fn run(args: &DemoArgs) -> Result {
     contact::write(&folder.join("contact.png"), &rows)?;
 
     let given = Options { prior: PriorChoice::Given, ..shape.clone() };
-    let shown = Shown { scene: &scene_folder, options: &without_depth, cloud: None, cloud_points: None };
-    let bound = measure::split(&shown, &split, &given, 1)?;
+    let shown = Shown::plain(&scene_folder, &without_depth);
+    let bound = measure::split(&shown, &split, &given, &OfVehicle::default())?;
     Ok(Outcome::done(text(folder, &split, &measured, &bound)))
 }
 
@@ -71,7 +73,7 @@ fn text(folder: &Path, split: &split::Split, shape: &Measured, given: &Measured)
             m.errors.psnr_db,
             m.errors.ssim.unwrap_or(f64::NAN),
             m.errors.silhouette_iou,
-            m.reconstruct_ms / 1e3,
+            m.reconstruct_ms.unwrap_or(f64::NAN) / 1e3,
             m.render_ms,
             shown::count(m.gaussians as usize),
         )

@@ -24,6 +24,9 @@ pub(crate) struct MethodArgs {
     /// A Gaussian head, an ONNX file in the contract of docs/ONNX.md, instead of the built-in one
     #[arg(long, value_name = "M.onnx")]
     pub(crate) head_model: Option<PathBuf>,
+    /// Leave out what the head's network says of where a pixel's Gaussian is beside the depth (the paper's ablation)
+    #[arg(long, requires = "head_model")]
+    no_offset: bool,
     /// ONNX Runtime's library or its folder; else VG_ONNXRUNTIME, else that of an installed Python package
     #[arg(long, value_name = "PATH")]
     onnxruntime: Option<PathBuf>,
@@ -118,6 +121,11 @@ impl MethodArgs {
         })
     }
 
+    /// Whether nothing was said of how to reconstruct, but which networks there are.
+    pub(crate) fn is_silent(&self) -> bool {
+        self.plain_options() == Options::default() && self.cloud.is_none()
+    }
+
     /// How networks are opened.
     pub(crate) fn model_options(&self) -> ModelOptions {
         ModelOptions {
@@ -142,6 +150,7 @@ impl MethodArgs {
             },
             prior_model: None,
             head_model: None,
+            ignore_offset: self.no_offset,
             symmetry: match self.symmetry {
                 Symmetry::Auto => SymmetryMode::Auto,
                 Symmetry::Always => SymmetryMode::Always,

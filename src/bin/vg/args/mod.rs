@@ -1,10 +1,12 @@
 //! The command line: commands and their options.
 
 mod align;
+mod eval;
 mod method;
 mod values;
 
 pub(crate) use align::{AlignArgs, Mode};
+pub(crate) use eval::{EvalArgs, JudgeArgs, ParetoArgs, TableName, VehiclesArgs};
 pub(crate) use method::MethodArgs;
 
 use clap::{Args, Parser, Subcommand};
@@ -163,73 +165,6 @@ pub(crate) struct RenderArgs {
 pub(crate) struct InfoArgs {
     /// Gaussians or a point cloud, PLY
     pub(crate) file: PathBuf,
-}
-
-#[derive(Args)]
-pub(crate) struct EvalArgs {
-    /// Scenes, as for `reconstruct`; several make a table with their mean
-    #[arg(required = true)]
-    pub(crate) scenes: Vec<PathBuf>,
-    /// JSON of {"KEY": {"input": [views], "test": [views]}}; a name that is not found here is looked up in each
-    /// scene's folder
-    #[arg(long, value_name = "FILE", default_value = "split.json")]
-    pub(crate) split: PathBuf,
-    /// This key of the split only
-    #[arg(long, value_name = "KEY")]
-    pub(crate) only: Option<String>,
-    #[command(flatten)]
-    pub(crate) method: MethodArgs,
-    #[command(flatten)]
-    pub(crate) frame: FrameArgs,
-    #[command(flatten)]
-    pub(crate) depth: DepthArgs,
-    /// Show the method only N points of the cloud, of those that the input cameras see; a cloud that is not found
-    /// here is looked up in each scene's folder
-    #[arg(long, value_name = "N", requires = "cloud", value_parser = clap::value_parser!(u32).range(1..))]
-    pub(crate) cloud_points: Option<u32>,
-    /// Time the reconstruction R times and report the median
-    #[arg(long, value_name = "R", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub(crate) repeat: u32,
-    /// Write the numbers, per view too
-    #[arg(long, value_name = "FILE")]
-    pub(crate) json: Option<PathBuf>,
-}
-
-#[derive(Args)]
-pub(crate) struct ParetoArgs {
-    /// Scenes, as for `reconstruct`
-    #[arg(required = true)]
-    pub(crate) scenes: Vec<PathBuf>,
-    /// As for `eval`
-    #[arg(long, value_name = "FILE", default_value = "split.json")]
-    pub(crate) split: PathBuf,
-    /// This key of the split only
-    #[arg(long, value_name = "KEY")]
-    pub(crate) only: Option<String>,
-    /// A point of the sweep: options of `eval` that say how to reconstruct, "--refine 5s", with a name before a colon
-    /// if it is to have one; once for each point
-    #[arg(long = "point", value_name = "[NAME:] OPTIONS", required = true, allow_hyphen_values = true)]
-    pub(crate) points: Vec<String>,
-    /// Options that all points have
-    #[arg(long, value_name = "OPTIONS", default_value = "", allow_hyphen_values = true)]
-    pub(crate) with: String,
-    #[command(flatten)]
-    pub(crate) frame: FrameArgs,
-    /// Time each point R times, one after the other, and report the median and the spread
-    #[arg(long, value_name = "R", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub(crate) repeat: u32,
-    /// Write the table
-    #[arg(long, value_name = "FILE")]
-    pub(crate) csv: Option<PathBuf>,
-    /// Write a plot of PSNR against seconds
-    #[arg(long, value_name = "FILE")]
-    pub(crate) svg: Option<PathBuf>,
-    /// Heading of the plot
-    #[arg(long, value_name = "TEXT", default_value = "Error against run time")]
-    pub(crate) title: String,
-    /// Write all numbers
-    #[arg(long, value_name = "FILE")]
-    pub(crate) json: Option<PathBuf>,
 }
 
 #[derive(Args)]

@@ -3,6 +3,7 @@
 //! The photograph is composited on white with its mask, the render is drawn on white with its own alpha, and the
 //! full frames are compared. A distorted camera's photograph stays on its own grid; the renderer follows it there.
 
+use super::judge::OfVehicle;
 use super::split::Split;
 use super::sweep::sweep;
 use crate::job::Result;
@@ -11,8 +12,8 @@ use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
 use vg::io::SceneOptions;
-use vg::metrics::ViewErrors;
-use vg::pipeline::{Options, PriorChoice, Reconstruction};
+use vg::metrics::{SurfaceErrors, ViewErrors};
+use vg::pipeline::{Options, PriorChoice};
 use vg::progress::Threads;
 use vg::render::{CpuRenderer, RenderOptions, Rendered, Renderer};
 use vg::scene::Cloud;
@@ -26,6 +27,10 @@ pub(crate) struct Measured {
     /// Means over the test views.
     #[serde(flatten)]
     pub(crate) errors: ViewErrors,
+    /// LPIPS, mean over the test views, where a network for it was given.
+    pub(crate) lpips: Option<f64>,
+    /// The model's surface against a scan, where there is one.
+    pub(crate) surface: Option<SurfaceErrors>,
     /// PSNR in the input views, dB.
     pub(crate) input_psnr_db: Option<f64>,
     /// SSIM there.
@@ -34,8 +39,8 @@ pub(crate) struct Measured {
     pub(crate) input_depth_mae_m: Option<f64>,
     /// The 90th percentile there, metres, mean over the views.
     pub(crate) input_depth_p90_m: Option<f64>,
-    /// Median over the repeats, milliseconds.
-    pub(crate) reconstruct_ms: f64,
+    /// Median over the repeats, milliseconds; `None` of what was made elsewhere.
+    pub(crate) reconstruct_ms: Option<f64>,
     /// Median over the test views, milliseconds.
     pub(crate) render_ms: f64,
     /// In the model.
@@ -52,6 +57,8 @@ pub(crate) struct MeasuredView {
     /// Its numbers.
     #[serde(flatten)]
     pub(crate) errors: ViewErrors,
+    /// LPIPS, where a network for it was given.
+    pub(crate) lpips: Option<f64>,
 }
 
 /// What there is to show to the method.
@@ -66,32 +73,57 @@ pub(crate) struct Shown<'a> {
     pub(crate) cloud_points: Option<usize>,
 }
 
-/// Reconstructs `repeat` times and measures once.
-pub(crate) fn split(from: &Shown, split: &Split, method: &Options, repeat: u32) -> Result<Measured> {
-    let (path, options) = (from.scene, from.options);
+impl<'a> Shown<'a> {
+    /// Without a cloud.
+    pub(crate) fn plain(scene: &'a Path, options: &'a SceneOptions) -> Self {
+        Self { scene, options, cloud: None, cloud_points: None }
+    }
+}
+
+/// Reconstructs and measures once.
+pub(crate) fn split(from: &Shown, split: &Split, method: &Options, judge: &OfVehicle) -> Result<Measured> {
     let shown = inputs(from, split, method)?;
     let made = reconstruct::reconstruct(&shown, method)?;
-    let mut times = vec![made.report.total_ms];
-    for _ in 1..repeat {
-        times.push(reconstruct::reconstruct(&shown, method)?.report.total_ms);
-    }
     drop(shown);
-    // Depth of the test views is for the measure only.
-    let with_depth = SceneOptions { load_depth: true, ..options.clone() };
-    let judged = scene::open(path, &split.test, &with_depth)?;
-    let (_, mut measured) = judge(&made, &judged.scene.views, method.threads)?;
-    measured.reconstruct_ms = median(&mut times);
-    // Opened again with depth, for this measure only: the prior has done its work without.
-    let judged = scene::open(path, &split.input, &with_depth)?;
-    let drawn = drawn(&made.gaussians, &judged.scene.views, method.threads)?.0;
+    let mut measured = model(from, split, &made.gaussians, method.threads, judge)?;
+    measured.prior = made.report.prior.to_owned();
+    measured.reconstruct_ms = Some(made.report.total_ms);
+    if made.report.prior == "given" {
+        (measured.input_depth_mae_m, measured.input_depth_p90_m) = (None, None);
+    }
+    Ok(measured)
+}
+
+/// Measures a model in a split's views, wherever it came from.
+pub(crate) fn model(
+    from: &Shown,
+    split: &Split,
+    made: &Gaussians,
+    threads: usize,
+    by: &OfVehicle,
+) -> Result<Measured> {
+    // Depth is for the measure only; a method has done its work without, unless it was to see it.
+    let with_depth = SceneOptions { load_depth: true, ..from.options.clone() };
+    let judged = scene::open(from.scene, &split.test, &with_depth)?;
+    let (drawn_tests, mut measured) = judge(made, &judged.scene.views, threads)?;
+    if let Some(lpips) = by.lpips {
+        for ((view, drawn), truth) in measured.views.iter_mut().zip(&drawn_tests).zip(&judged.scene.views) {
+            view.lpips = lpips.of(drawn, truth)?;
+        }
+        measured.lpips = mean_of(measured.views.iter().filter_map(|view| view.lpips));
+    }
+    drop((drawn_tests, judged));
+    if let Some(scan) = &by.scan {
+        measured.surface = Some(Threads::new(threads)?.run(|| SurfaceErrors::of(made, scan.points()))?);
+    }
+    let judged = scene::open(from.scene, &split.input, &with_depth)?;
+    let drawn = drawn(made, &judged.scene.views, threads)?.0;
     let errors: Vec<_> = drawn.iter().zip(&judged.scene.views).map(|(d, v)| ViewErrors::of(d, v)).collect();
     let mean = ViewErrors::mean(&errors);
     measured.input_psnr_db = mean.map(|mean| mean.psnr_db);
     measured.input_ssim = mean.and_then(|mean| mean.ssim);
-    if made.report.prior != "given" {
-        measured.input_depth_mae_m = mean.and_then(|mean| mean.depth_mae_m);
-        measured.input_depth_p90_m = mean.and_then(|mean| mean.depth_p90_m);
-    }
+    measured.input_depth_mae_m = mean.and_then(|mean| mean.depth_mae_m);
+    measured.input_depth_p90_m = mean.and_then(|mean| mean.depth_p90_m);
     Ok(measured)
 }
 
@@ -117,28 +149,26 @@ fn inputs(from: &Shown, split: &Split, method: &Options) -> Result<vg::Scene> {
 }
 
 /// The model drawn into these views, and how far that is from their photographs.
-pub(crate) fn judge(
-    made: &Reconstruction,
-    views: &[View],
-    threads: usize,
-) -> Result<(Vec<Rendered>, Measured)> {
-    let (drawn, render_ms) = drawn(&made.gaussians, views, threads)?;
+pub(crate) fn judge(made: &Gaussians, views: &[View], threads: usize) -> Result<(Vec<Rendered>, Measured)> {
+    let (drawn, render_ms) = drawn(made, views, threads)?;
     let each: Vec<ViewErrors> = drawn.iter().zip(views).map(|(d, v)| ViewErrors::of(d, v)).collect();
     let none = || Error::argument("test", "no view", "at least one");
     let measured = Measured {
-        prior: made.report.prior.to_owned(),
+        prior: String::new(),
+        lpips: None,
+        surface: None,
         errors: ViewErrors::mean(&each).ok_or_else(none)?,
-        input_psnr_db: made.report.input_error.map(|error| error.psnr_db),
+        input_psnr_db: None,
         input_ssim: None,
         input_depth_mae_m: None,
         input_depth_p90_m: None,
-        reconstruct_ms: made.report.total_ms,
+        reconstruct_ms: None,
         render_ms,
-        gaussians: made.gaussians.len() as f64,
+        gaussians: made.len() as f64,
         views: views
             .iter()
             .zip(each)
-            .map(|(v, errors)| MeasuredView { name: v.name.clone(), errors })
+            .map(|(v, errors)| MeasuredView { name: v.name.clone(), errors, lpips: None })
             .collect(),
     };
     Ok((drawn, measured))
@@ -175,22 +205,42 @@ pub(crate) fn median(values: &mut [f64]) -> f64 {
 pub(crate) fn mean(all: &[&Measured]) -> Option<Measured> {
     let errors: Vec<ViewErrors> = all.iter().map(|m| m.errors).collect();
     let errors = ViewErrors::mean(&errors)?;
-    let mean = |values: Vec<f64>| {
-        let n = values.len();
-        (n > 0).then(|| values.iter().sum::<f64>() / n as f64)
-    };
-    let of = |get: fn(&Measured) -> f64| mean(all.iter().map(|m| get(m)).collect());
+    let of = |get: fn(&Measured) -> f64| mean_of(all.iter().map(|m| get(m)));
     let same_prior = all.iter().all(|m| m.prior == all[0].prior);
     Some(Measured {
         prior: if same_prior { all[0].prior.clone() } else { "mixed".into() },
         errors,
-        input_psnr_db: mean(all.iter().filter_map(|m| m.input_psnr_db).collect()),
-        input_ssim: mean(all.iter().filter_map(|m| m.input_ssim).collect()),
-        input_depth_mae_m: mean(all.iter().filter_map(|m| m.input_depth_mae_m).collect()),
-        input_depth_p90_m: mean(all.iter().filter_map(|m| m.input_depth_p90_m).collect()),
-        reconstruct_ms: of(|m| m.reconstruct_ms)?,
+        lpips: mean_of(all.iter().filter_map(|m| m.lpips)),
+        surface: mean_surface(&all.iter().filter_map(|m| m.surface).collect::<Vec<_>>()),
+        input_psnr_db: mean_of(all.iter().filter_map(|m| m.input_psnr_db)),
+        input_ssim: mean_of(all.iter().filter_map(|m| m.input_ssim)),
+        input_depth_mae_m: mean_of(all.iter().filter_map(|m| m.input_depth_mae_m)),
+        input_depth_p90_m: mean_of(all.iter().filter_map(|m| m.input_depth_p90_m)),
+        reconstruct_ms: mean_of(all.iter().filter_map(|m| m.reconstruct_ms)),
         render_ms: of(|m| m.render_ms)?,
         gaussians: of(|m| m.gaussians)?.round(),
         views: Vec::new(),
+    })
+}
+
+/// `None` of nothing.
+fn mean_of(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, n) = values.fold((0.0, 0.0), |(sum, n), value| (sum + value, n + 1.0));
+    (n > 0.0).then(|| sum / n)
+}
+
+/// Of the errors of size, the means of their absolute values.
+fn mean_surface(all: &[SurfaceErrors]) -> Option<SurfaceErrors> {
+    let of = |get: fn(&SurfaceErrors) -> f64| mean_of(all.iter().map(get));
+    Some(SurfaceErrors {
+        accuracy_m: of(|s| s.accuracy_m)?,
+        completeness_m: of(|s| s.completeness_m)?,
+        chamfer_m: of(|s| s.chamfer_m)?,
+        precision: of(|s| s.precision)?,
+        recall: of(|s| s.recall)?,
+        f_score: of(|s| s.f_score)?,
+        length_error_percent: of(|s| s.length_error_percent.abs())?,
+        width_error_percent: of(|s| s.width_error_percent.abs())?,
+        height_error_percent: of(|s| s.height_error_percent.abs())?,
     })
 }

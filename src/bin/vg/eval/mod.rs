@@ -1,107 +1,137 @@
 //! `vg eval`: error and time of reconstructions from the inputs of splits, measured in their test views.
 
+pub(crate) mod contest;
+mod import;
+pub(crate) mod judge;
 pub(crate) mod measure;
 pub(crate) mod split;
 mod sweep;
-mod table;
+pub(crate) mod system;
+pub(crate) mod table;
+mod tables;
+pub(crate) mod vehicles;
 
-use crate::args::EvalArgs;
-use crate::job::{self, Outcome, Result};
-use crate::{cloud, files, scene};
-use measure::{Measured, Shown};
+use crate::args::{EvalArgs, TableName};
+use crate::files;
+use crate::job::{Failure, Outcome, Result, USAGE};
+use contest::{Aligned, Broken, Contest, Row};
+use measure::Measured;
 use serde::Serialize;
-use std::path::Path;
-use table::Table;
+use system::{Maker, Method, System, Takes};
 use vg::pipeline::Options;
 
-/// A split that was measured.
-#[derive(Serialize)]
-struct Row {
-    scene: String,
-    split: String,
-    #[serde(flatten)]
-    measured: Measured,
-}
-
-/// A scene or a split that could not be.
-#[derive(Serialize)]
-struct Broken {
-    scene: String,
-    error: String,
-}
-
-/// What `--json` writes.
+/// What `--json` writes of one system.
 #[derive(Serialize)]
 struct Document<'a> {
     version: &'static str,
     settings: &'a Options,
     repeat: u32,
-    splits: &'a [Row],
-    mean: Option<Measured>,
+    splits: &'a [contest::InSplit],
+    mean: Option<&'a Measured>,
+    aligned: &'a [Aligned],
+    errors: &'a [Broken],
+}
+
+/// What it writes of several.
+#[derive(Serialize)]
+struct Comparison<'a> {
+    version: &'static str,
+    table: Option<String>,
+    common: &'a str,
+    repeat: u32,
+    lpips_net: Option<&'a str>,
+    systems: &'a [Row],
+    aligned: &'a [Aligned],
     errors: &'a [Broken],
 }
 
 /// Every scene that can be evaluated is; the others are errors, and the exit code says that there were some.
 pub(crate) fn run(args: &EvalArgs) -> Result {
-    args.json.iter().try_for_each(|path| files::prepare(path))?;
-    let settings = args.method.options()?;
-    let (mut rows, mut errors) = (Vec::new(), Vec::new());
-    for path in &args.scenes {
-        let shown = path.display().to_string();
-        let name = name_of(path);
-        match one(path, args, &settings, |split, measured| {
-            rows.push(Row { scene: name.clone(), split: split.to_owned(), measured });
-        }) {
-            Ok(()) => job::warn(),
-            // One scene alone is the job itself.
-            Err(failure) if args.scenes.len() == 1 => return Err(failure),
-            Err(failure) => {
-                job::complain(&format!("{shown}: {}", failure.message));
-                errors.push(Broken { scene: shown, error: failure.message });
-            }
-        }
+    let outputs: Vec<_> = [&args.json, &args.markdown].into_iter().flatten().cloned().collect();
+    files::refuse_clashes(&outputs, &[])?;
+    outputs.iter().try_for_each(|path| files::prepare(path))?;
+    if args.table.is_none() && args.systems.is_empty() && args.imports.is_empty() {
+        return one(args);
     }
-    let mean = measure::mean(&rows.iter().map(|row| &row.measured).collect::<Vec<_>>());
-    let mut table = Table::new();
-    for row in &rows {
-        table.push(&row.scene, &row.split, &row.measured);
+    if !args.method.is_silent() || args.depth.depth_scale.is_some() || args.cloud_points.is_some() {
+        let message = "options of the method beside --table, --system or --import; expected them in --with \"...\", \
+                       for all rows, or in a --system";
+        return Err(Failure { message: message.into(), code: USAGE });
     }
-    if let Some(mean) = mean.as_ref().filter(|_| rows.len() > 1) {
-        table.push("mean", "", mean);
+    several(args)
+}
+
+/// A table of one system, a row for each split.
+fn one(args: &EvalArgs) -> Result {
+    if !args.with.is_empty() {
+        let message = "--with without --table, --system or --import; expected its options as they are";
+        return Err(Failure { message: message.into(), code: USAGE });
+    }
+    let method = Method {
+        settings: args.method.options()?,
+        depth_scale: args.depth.depth_scale,
+        cloud: args.method.cloud.clone(),
+        cloud_points: args.cloud_points.map(|n| n as usize),
+        words: None,
+    };
+    let settings = method.settings.clone();
+    let system =
+        System { name: "this".into(), maker: Maker::Method(Box::new(method)), takes: Takes::default() };
+    let contest = contest::hold(
+        &args.vehicles,
+        &args.judge,
+        &args.method.model_options(),
+        std::slice::from_ref(&system),
+        args.repeat,
+    )?;
+    let row = &contest.rows[0];
+    let each = row.each.iter().map(contest::InSplit::parts);
+    let mean = row.mean.as_ref().filter(|_| row.each.len() > 1).map(|mean| ("mean", "", mean));
+    let grid = table::of_splits(each.chain(mean));
+    if let Some(path) = &args.markdown {
+        files::write(path, grid.markdown().as_bytes())?;
     }
     if let Some(path) = &args.json {
-        let version = env!("CARGO_PKG_VERSION");
         let document = Document {
-            version,
+            version: env!("CARGO_PKG_VERSION"),
             settings: &settings,
             repeat: args.repeat,
-            splits: &rows,
-            mean,
-            errors: &errors,
+            splits: &row.each,
+            mean: row.mean.as_ref(),
+            aligned: &contest.aligned,
+            errors: &contest.errors,
         };
         files::write_json(path, &document)?;
     }
-    let text = if rows.is_empty() { String::new() } else { table.text() };
-    Ok(Outcome { text, complete: errors.is_empty() })
+    Ok(Outcome { text: grid.text(), complete: contest.is_complete(std::slice::from_ref(&system)) })
 }
 
-/// All splits of a scene, each handed over as soon as it is measured.
-fn one(path: &Path, args: &EvalArgs, settings: &Options, mut done: impl FnMut(&str, Measured)) -> Result<()> {
-    let splits = split::read(&split::find(&args.split, path), args.only.as_deref())?;
-    let options = scene::options(&args.frame, args.depth.depth_scale, false)?;
-    let cloud = args.method.cloud.as_ref().map(|file| cloud::read(&split::find(file, path))).transpose()?;
-    let cloud_points = args.cloud_points.map(|n| n as usize);
-    for (key, split) in &splits {
-        let shown = Shown { scene: path, options: &options, cloud: cloud.as_ref(), cloud_points };
-        done(key, measure::split(&shown, split, settings, args.repeat)?);
+/// A table of several, a row for each.
+fn several(args: &EvalArgs) -> Result {
+    let systems = tables::systems(args)?;
+    let model_options = args.method.model_options();
+    let contest = contest::hold(&args.vehicles, &args.judge, &model_options, &systems, args.repeat)?;
+    let Contest { rows, errors, aligned, lpips_net } = &contest;
+    let grid = table::of_systems(rows, args.table == Some(TableName::Omissions));
+    let missing = table::missing(rows);
+    if let Some(path) = &args.markdown {
+        let lines: String = missing.lines().map(|line| format!("- {line}\n")).collect();
+        let text = if lines.is_empty() { grid.markdown() } else { format!("{}\n{lines}", grid.markdown()) };
+        files::write(path, text.as_bytes())?;
     }
-    Ok(())
-}
-
-/// The folder's name, of a file the name of its folder.
-fn name_of(scene: &Path) -> String {
-    let absolute = std::fs::canonicalize(scene).unwrap_or_else(|_| scene.to_owned());
-    let folder = if absolute.is_file() { absolute.parent() } else { Some(absolute.as_path()) };
-    let name = folder.and_then(Path::file_name).unwrap_or(scene.as_os_str());
-    name.to_string_lossy().into_owned()
+    if let Some(path) = &args.json {
+        let document = Comparison {
+            version: env!("CARGO_PKG_VERSION"),
+            table: args.table.map(|t| format!("{t:?}").to_lowercase()),
+            common: &args.with,
+            repeat: args.repeat,
+            lpips_net: lpips_net.as_deref(),
+            systems: rows,
+            aligned,
+            errors,
+        };
+        files::write_json(path, &document)?;
+    }
+    let text = [grid.text(), missing].into_iter().filter(|t| !t.is_empty()).collect::<Vec<_>>().join("\n");
+    Ok(Outcome { text, complete: contest.is_complete(&systems) })
 }

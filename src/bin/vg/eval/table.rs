@@ -1,80 +1,142 @@
-//! The numbers as a table for people.
+//! The numbers as tables for people.
 
+use super::contest::Row;
 use super::measure::Measured;
+use crate::grid::{Column, Grid, number};
+use Column::{Numbers, Rare, Words};
 
-/// Heading of each column.
-const HEADINGS: [&str; 14] = [
-    "scene",
-    "split",
-    "prior",
-    "PSNR dB",
-    "SSIM",
-    "PSNR box",
-    "IoU",
-    "depth MAE m",
-    "in. PSNR dB",
-    "in. depth MAE m",
-    "p90",
-    "reconstruct s",
-    "render ms",
-    "Gaussians",
-];
-
-/// Columns of words are aligned left, columns of numbers right.
-const WORDS: usize = 3;
-
-/// Columns that are shown only where one of the rows has a number for them.
-const OPTIONAL: std::ops::Range<usize> = 8..11;
-
-/// What stands for no number.
-const NONE: &str = "-";
-
-/// Rows of cells below the headings.
-pub(crate) struct Table(Vec<[String; HEADINGS.len()]>);
-
-impl Table {
-    /// With no rows yet.
-    pub(crate) fn new() -> Self {
-        Self(vec![HEADINGS.map(Into::into)])
-    }
-
-    /// One split, or the mean.
-    pub(crate) fn push(&mut self, scene: &str, split: &str, m: &Measured) {
-        let number = |value: Option<f64>, digits: usize| {
-            value.map_or_else(|| NONE.into(), |v| format!("{v:.digits$}"))
-        };
-        self.0.push([
+/// A row for each split, and their mean.
+pub(crate) fn of_splits<'a>(rows: impl IntoIterator<Item = (&'a str, &'a str, &'a Measured)>) -> Grid {
+    let mut grid = Grid::new(&[
+        Words("scene"),
+        Words("split"),
+        Words("prior"),
+        Numbers("PSNR dB"),
+        Numbers("SSIM"),
+        Rare("LPIPS"),
+        Numbers("PSNR box"),
+        Numbers("IoU"),
+        Numbers("depth MAE m"),
+        Rare("Chamfer m"),
+        Rare("F 5 cm"),
+        Rare("length %"),
+        Rare("width %"),
+        Rare("height %"),
+        Rare("in. PSNR dB"),
+        Rare("in. depth MAE m"),
+        Rare("p90"),
+        Numbers("reconstruct s"),
+        Numbers("render ms"),
+        Numbers("Gaussians"),
+    ]);
+    for (scene, split, m) in rows {
+        let [chamfer, f_score, length, width, height] = surface(m);
+        grid.push([
             scene.into(),
             split.into(),
             m.prior.clone(),
             number(Some(m.errors.psnr_db), 3),
             number(m.errors.ssim, 4),
+            number(m.lpips, 4),
             number(m.errors.psnr_box_db, 3),
             number(Some(m.errors.silhouette_iou), 4),
             number(m.errors.depth_mae_m, 4),
+            chamfer,
+            f_score,
+            length,
+            width,
+            height,
             number(m.input_psnr_db, 3),
             number(m.input_depth_mae_m, 4),
             number(m.input_depth_p90_m, 4),
-            number(Some(m.reconstruct_ms / 1e3), 3),
+            number(m.reconstruct_ms.map(|ms| ms / 1e3), 3),
             number(Some(m.render_ms), 2),
             format!("{:.0}", m.gaussians),
         ]);
     }
+    grid
+}
 
-    /// Lines without trailing spaces.
-    pub(crate) fn text(&self) -> String {
-        let is_shown =
-            |column: &usize| !OPTIONAL.contains(column) || self.0[1..].iter().any(|row| row[*column] != NONE);
-        let width = |column: usize| self.0.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
-        let columns: Vec<(usize, usize)> =
-            (0..HEADINGS.len()).filter(is_shown).map(|column| (column, width(column))).collect();
-        let line = |row: &[String; HEADINGS.len()]| {
-            let cells = columns.iter().map(|&(column, width)| {
-                let cell = &row[column];
-                if column < WORDS { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
-            });
-            cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
-        };
-        self.0.iter().map(line).collect::<Vec<_>>().join("\n")
+/// A row for each system. With `beside`, what a row gains over the first: dB, seconds, MiB.
+pub(crate) fn of_systems(rows: &[Row], beside: bool) -> Grid {
+    let mut grid = Grid::new(&[
+        Words("system"),
+        Numbers("splits"),
+        Numbers("PSNR dB"),
+        Rare("+-"),
+        Numbers("SSIM"),
+        Rare("LPIPS"),
+        Numbers("IoU"),
+        Rare("depth MAE m"),
+        Rare("Chamfer m"),
+        Rare("F 5 cm"),
+        Rare("length %"),
+        Rare("width %"),
+        Rare("height %"),
+        Rare("in. PSNR dB"),
+        Numbers("seconds"),
+        Rare("least"),
+        Rare("most"),
+        Rare("peak MiB"),
+        Numbers("Gaussians"),
+        Rare("dB more"),
+        Rare("s more"),
+        Rare("MiB more"),
+    ]);
+    let first = rows.first().filter(|_| beside);
+    for row in rows {
+        let m = row.mean.as_ref();
+        let of = |get: &dyn Fn(&Measured) -> Option<f64>| m.and_then(get);
+        let mib = |row: &Row| row.peak_bytes.map(|bytes| bytes as f64 / f64::from(1 << 20));
+        let psnr = |row: &Row| row.mean.as_ref().map(|m| m.errors.psnr_db);
+        let more = |get: &dyn Fn(&Row) -> Option<f64>| Some(get(row)? - get(first?)?);
+        let [chamfer, f_score, length, width, height] =
+            m.map_or_else(|| [(); 5].map(|()| number(None, 0)), surface);
+        grid.push([
+            row.system.clone(),
+            row.splits.to_string(),
+            number(psnr(row), 3),
+            number(row.psnr_standard_error_db, 3),
+            number(of(&|m| m.errors.ssim), 4),
+            number(of(&|m| m.lpips), 4),
+            number(of(&|m| Some(m.errors.silhouette_iou)), 4),
+            number(of(&|m| m.errors.depth_mae_m), 4),
+            chamfer,
+            f_score,
+            length,
+            width,
+            height,
+            number(of(&|m| m.input_psnr_db), 3),
+            number(row.seconds, 3),
+            number(row.seconds_range.map(|r| r[0]), 3),
+            number(row.seconds_range.map(|r| r[1]), 3),
+            number(mib(row), 0),
+            number(of(&|m| Some(m.gaussians)), 0),
+            number(more(&psnr), 3),
+            number(more(&|row| row.seconds), 3),
+            number(more(&mib), 0),
+        ]);
     }
+    grid
+}
+
+/// Chamfer distance, F-score, and errors of length, width and height.
+fn surface(m: &Measured) -> [String; 5] {
+    let of =
+        |get: fn(&vg::metrics::SurfaceErrors) -> f64, digits| number(m.surface.as_ref().map(get), digits);
+    [
+        of(|s| s.chamfer_m, 4),
+        of(|s| s.f_score, 3),
+        of(|s| s.length_error_percent, 2),
+        of(|s| s.width_error_percent, 2),
+        of(|s| s.height_error_percent, 2),
+    ]
+}
+
+/// Why rows have no numbers, a line each.
+pub(crate) fn missing(rows: &[Row]) -> String {
+    let lines = rows.iter().flat_map(|row| {
+        row.missing.iter().map(|why| format!("{}: {}", row.system, why.replace(['\n', '\r'], " ")))
+    });
+    lines.collect::<Vec<_>>().join("\n")
 }

@@ -1,6 +1,6 @@
 //! The sweep as a picture: error against run time, SVG.
 
-use super::point::Row;
+use super::{Point, place};
 use std::fmt::Write;
 
 const SIZE: [f64; 2] = [860.0, 520.0];
@@ -42,13 +42,40 @@ impl Axis {
     }
 }
 
-/// PSNR of the test views against seconds, both with their spread; the front is joined.
-pub(super) fn svg(rows: &[Row], title: &str) -> String {
+/// A point with its place and its spread.
+struct Mark<'a> {
+    name: &'a str,
+    seconds: f64,
+    seconds_range: [f64; 2],
+    psnr: f64,
+    psnr_range: [f64; 2],
+    on_front: bool,
+}
+
+impl<'a> Mark<'a> {
+    /// `None` of a point that was not measured, or whose pictures have no error at all.
+    fn of(point: &'a Point) -> Option<Self> {
+        let row = &point.row;
+        let [seconds, psnr] = place(row).filter(|place| place[1].is_finite())?;
+        let error = row.psnr_standard_error_db.unwrap_or(0.0);
+        Some(Self {
+            name: &row.system,
+            seconds,
+            seconds_range: row.seconds_range?,
+            psnr,
+            psnr_range: [psnr - error, psnr + error],
+            on_front: point.on_front,
+        })
+    }
+}
+
+/// PSNR of the test views against seconds, both with their spread; the front is joined. `None` of no point.
+pub(super) fn svg(points: &[Point], title: &str) -> Option<String> {
+    let rows: Vec<Mark> = points.iter().filter_map(Mark::of).collect();
+    if rows.is_empty() {
+        return None;
+    }
     let [width, height] = SIZE;
-    let spread = |row: &Row| {
-        let (psnr, error) = (row.measured.errors.psnr_db, row.psnr_standard_error_db.unwrap_or(0.0));
-        [psnr - error, psnr + error]
-    };
     let least = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::INFINITY, f64::min);
     let most = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::NEG_INFINITY, f64::max);
     let x = Axis {
@@ -59,8 +86,8 @@ pub(super) fn svg(rows: &[Row], title: &str) -> String {
         is_log: true,
     };
     let y = Axis {
-        low: least(&mut rows.iter().map(|r| spread(r)[0])) - 0.15,
-        high: most(&mut rows.iter().map(|r| spread(r)[1])) + 0.15,
+        low: least(&mut rows.iter().map(|r| r.psnr_range[0])) - 0.15,
+        high: most(&mut rows.iter().map(|r| r.psnr_range[1])) + 0.15,
         from: height - MARGIN[3],
         to: MARGIN[1],
         is_log: false,
@@ -74,21 +101,19 @@ pub(super) fn svg(rows: &[Row], title: &str) -> String {
     );
     grid(&mut out, &x, &y);
 
-    let mut front: Vec<&Row> = rows.iter().filter(|r| r.on_front).collect();
+    let mut front: Vec<&Mark> = rows.iter().filter(|r| r.on_front).collect();
     front.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
-    let places: Vec<String> = front
-        .iter()
-        .map(|r| format!("{:.1},{:.1}", x.at(r.seconds), y.at(r.measured.errors.psnr_db)))
-        .collect();
+    let places: Vec<String> =
+        front.iter().map(|r| format!("{:.1},{:.1}", x.at(r.seconds), y.at(r.psnr))).collect();
     let _ = writeln!(
         out,
         "<polyline points=\"{}\" fill=\"none\" stroke=\"{FRONT}\" stroke-width=\"1.5\"/>",
         places.join(" ")
     );
-    for row in rows {
+    for row in &rows {
         let color = if row.on_front { FRONT } else { BEHIND };
-        let (at_x, at_y) = (x.at(row.seconds), y.at(row.measured.errors.psnr_db));
-        let [y0, y1] = spread(row).map(|v| y.at(v));
+        let (at_x, at_y) = (x.at(row.seconds), y.at(row.psnr));
+        let [y0, y1] = row.psnr_range.map(|v| y.at(v));
         let [x0, x1] = row.seconds_range.map(|v| x.at(v));
         let _ = writeln!(
             out,
@@ -97,11 +122,11 @@ pub(super) fn svg(rows: &[Row], title: &str) -> String {
              <text x=\"{:.1}\" y=\"{:.1}\" fill=\"{color}\">{}</text>",
             at_x + 7.0,
             at_y + 17.0,
-            escaped(&row.point)
+            escaped(row.name)
         );
     }
     out.push_str("</svg>\n");
-    out
+    Some(out)
 }
 
 fn grid(out: &mut String, x: &Axis, y: &Axis) {

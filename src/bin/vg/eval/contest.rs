@@ -1,0 +1,275 @@
+//! All systems in all splits of all vehicles, in turns.
+//!
+//! Repeats are interleaved: every system once, then every system again, so that a machine that is busy for a while does
+//! not wrong one of them. Results are deterministic, so errors are measured in the first round only.
+
+use super::judge::{Judge, OfVehicle};
+use super::measure::{self, Measured, Shown};
+use super::split::{self, Split};
+use super::system::{Maker, Method, Side, System, Takes};
+use super::vehicles::{self, Vehicle};
+use crate::args::{JudgeArgs, VehiclesArgs};
+use crate::job::{self, Failure, Result};
+use crate::{cloud, memory, scene};
+use serde::Serialize;
+use std::collections::HashSet;
+use std::ffi::OsString;
+use std::path::Path;
+use vg::io::FitQuality;
+use vg::onnx::ModelOptions;
+use vg::scene::Cloud;
+
+/// What became of one system.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Row {
+    pub(crate) system: String,
+    /// Splits that were measured.
+    pub(crate) splits: usize,
+    /// Why there is no number, or none of some splits.
+    pub(crate) missing: Vec<String>,
+    /// Mean over the splits of the median over the repeats; of an import what its maker said.
+    pub(crate) seconds: Option<f64>,
+    /// Of the means over the splits, the least and the most of the repeats.
+    pub(crate) seconds_range: Option<[f64; 2]>,
+    /// Standard error of the mean PSNR over the splits; `None` of one split.
+    pub(crate) psnr_standard_error_db: Option<f64>,
+    /// Most memory of a process that reads the first split's views and reconstructs from them, bytes; `None` where the
+    /// system does not tell, and of what was made elsewhere.
+    pub(crate) peak_bytes: Option<u64>,
+    /// Means over the splits.
+    #[serde(flatten)]
+    pub(crate) mean: Option<Measured>,
+    /// Each split.
+    pub(crate) each: Vec<InSplit>,
+}
+
+/// What one system did in one split.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct InSplit {
+    scene: String,
+    split: String,
+    /// Of each repeat.
+    seconds: Vec<f64>,
+    #[serde(flatten)]
+    measured: Measured,
+}
+
+impl InSplit {
+    /// Scene, split, and its numbers.
+    pub(crate) fn parts(&self) -> (&str, &str, &Measured) {
+        (&self.scene, &self.split, &self.measured)
+    }
+}
+
+/// A vehicle that was aligned first.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Aligned {
+    scene: String,
+    residual_m: f64,
+    confidence: f64,
+}
+
+/// A vehicle that could not be measured at all.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Broken {
+    pub(crate) scene: String,
+    pub(crate) error: String,
+}
+
+/// Rows in the order of the systems, and what was in the way.
+pub(crate) struct Contest {
+    pub(crate) rows: Vec<Row>,
+    pub(crate) errors: Vec<Broken>,
+    /// How well each vehicle fits the scan that it was aligned to.
+    pub(crate) aligned: Vec<Aligned>,
+    /// The network that LPIPS is by, where it was measured.
+    pub(crate) lpips_net: Option<String>,
+}
+
+impl Contest {
+    /// Everything that could be asked was answered.
+    pub(crate) fn is_complete(&self, systems: &[System]) -> bool {
+        let is_whole = |(row, system): (&Row, &System)| {
+            row.missing.is_empty() || matches!(system.maker, Maker::Missing(_))
+        };
+        self.errors.is_empty() && self.rows.iter().zip(systems).all(is_whole)
+    }
+}
+
+/// What was measured of one system so far.
+#[derive(Default)]
+struct Runs {
+    each: Vec<InSplit>,
+    missing: Vec<String>,
+    /// Of the first split.
+    peak_bytes: Option<u64>,
+}
+
+/// Measures; vehicles and systems that fail are told and left out.
+pub(crate) fn hold(
+    vehicles: &VehiclesArgs,
+    judge: &JudgeArgs,
+    models: &ModelOptions,
+    systems: &[System],
+    repeat: u32,
+) -> Result<Contest> {
+    let judge = Judge::open(judge, models)?;
+    let scenes = vehicles::found(&vehicles.scenes)?;
+    let mut runs: Vec<Runs> = systems.iter().map(|_| Runs::default()).collect();
+    let (mut errors, mut aligned) = (Vec::new(), Vec::new());
+    for scene in &scenes {
+        let measured = Vehicle::open(scene, vehicles).and_then(|vehicle| {
+            aligned.extend(vehicle.fit.map(|FitQuality { residual_m, confidence }| {
+                let scene = vehicle.name.clone();
+                Aligned { scene, residual_m, confidence }
+            }));
+            one(&vehicle, &judge, systems, repeat, &mut runs)
+        });
+        match measured {
+            Ok(()) => job::warn(),
+            // One scene alone is the job itself.
+            Err(failure) if scenes.len() == 1 => return Err(failure),
+            Err(failure) => {
+                let shown = scene.display().to_string();
+                job::complain(&format!("{shown}: {}", failure.message));
+                errors.push(Broken { scene: shown, error: failure.message });
+            }
+        }
+    }
+    let rows = runs.into_iter().zip(systems).map(|(runs, system)| runs.row(system)).collect();
+    Ok(Contest { rows, errors, aligned, lpips_net: judge.lpips_net().map(Into::into) })
+}
+
+/// All systems in a vehicle's splits.
+fn one(vehicle: &Vehicle, judge: &Judge, systems: &[System], repeat: u32, runs: &mut [Runs]) -> Result<()> {
+    let judge: OfVehicle = judge.of(&vehicle.scene)?;
+    // A cause that several systems meet is told once.
+    let mut said = HashSet::new();
+    for (key, split) in &vehicle.splits {
+        // What is wrong with the photographs is not the systems' fault.
+        let views = split.input.iter().chain(&split.test).cloned().collect::<Vec<_>>();
+        scene::open(&vehicle.scene, &views, &vehicle.options(None))?;
+        let mut timed = Vec::new();
+        for (system, runs) in systems.iter().zip(runs.iter_mut()) {
+            let Some(split) = system.takes.split(vehicle, split)? else { continue };
+            let measured = match &system.maker {
+                Maker::Missing(_) => continue,
+                Maker::Import(import) => import
+                    .model(vehicle, key, &split, judge.scan.as_ref())
+                    .and_then(|made| {
+                        let options = vehicle.options(None);
+                        measure::model(&Shown::plain(&vehicle.scene, &options), &split, &made, 0, &judge)
+                    })
+                    .map(|m| Measured { reconstruct_ms: import.seconds.map(|s| 1e3 * s), ..m }),
+                Maker::Method(method) => {
+                    shown(vehicle, method, |shown| measure::split(shown, &split, &method.settings, &judge))
+                }
+            };
+            match measured {
+                Ok(measured) => {
+                    let seconds = measured.reconstruct_ms.map(|ms| ms / 1e3).into_iter().collect();
+                    let scene = vehicle.name.clone();
+                    runs.each.push(InSplit { scene, split: key.clone(), seconds, measured });
+                    if let Maker::Method(method) = &system.maker {
+                        if runs.each.len() == 1 {
+                            runs.peak_bytes = peak_bytes(vehicle, &split, method);
+                        }
+                        timed.push((method, split, runs));
+                    }
+                }
+                // One system alone is the job itself.
+                Err(failure) if systems.len() == 1 => return Err(failure),
+                Err(failure) => {
+                    if said.insert(failure.message.clone()) {
+                        job::complain(&format!(
+                            "{}, {key}, {}: {}",
+                            vehicle.name, system.name, failure.message
+                        ));
+                    }
+                    runs.missing.push(format!("{}, {key}: {}", vehicle.name, failure.message));
+                }
+            }
+        }
+        for _ in 1..repeat {
+            for (method, split, runs) in &mut timed {
+                let ms = shown(vehicle, method, |shown| measure::time(shown, split, &method.settings))?;
+                runs.each.last_mut().expect("the first round made it").seconds.push(ms / 1e3);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `None` for what `vg reconstruct` cannot be asked to do.
+fn peak_bytes(vehicle: &Vehicle, split: &Split, method: &Method) -> Option<u64> {
+    let words = method.words.as_ref().filter(|_| method.cloud_points.is_none())?;
+    let source = vehicle.source().ok()?;
+    let mut all: Vec<OsString> = vec![source.into(), "--views".into(), split.input.join(",").into()];
+    all.extend(words.iter().cloned());
+    memory::of_reconstruction(all, vehicle.vehicle_from_world.as_ref())
+}
+
+/// Opens what a method is shown of a vehicle.
+fn shown<T>(vehicle: &Vehicle, method: &Method, work: impl FnOnce(&Shown) -> Result<T>) -> Result<T> {
+    let read = |file: &std::path::PathBuf| cloud::read(&split::find(file, &vehicle.scene));
+    let cloud: Option<Cloud> = method.cloud.as_ref().map(read).transpose()?;
+    let (scene, options): (&Path, _) = (&vehicle.scene, &vehicle.options(method.depth_scale));
+    work(&Shown { scene, options, cloud: cloud.as_ref(), cloud_points: method.cloud_points })
+}
+
+impl Takes {
+    /// The split as this system takes it; `None` if it does not.
+    fn split(self, vehicle: &Vehicle, split: &Split) -> Result<Option<Split>> {
+        if let Some(side) = self.side {
+            let is_left = vehicle.side(&split.input)? > 0.0;
+            if is_left != (side == Side::Left) {
+                return Ok(None);
+            }
+        }
+        if !self.all_tests {
+            return Ok(Some(split.clone()));
+        }
+        let mut test: Vec<String> = vehicle.splits.values().flat_map(|s| s.test.iter().cloned()).collect();
+        test.sort();
+        test.dedup();
+        test.retain(|view| !split.input.contains(view));
+        if test.is_empty() {
+            return Err(Failure::job("no test view that is not an input as well"));
+        }
+        Ok(Some(Split { input: split.input.clone(), test }))
+    }
+}
+
+impl Runs {
+    fn row(self, system: &System) -> Row {
+        let mut missing = self.missing;
+        if let Maker::Missing(why) = &system.maker {
+            missing.push(why.clone());
+        } else if self.each.is_empty() && missing.is_empty() {
+            missing.push("no vehicle has such a split".into());
+        }
+        let measured: Vec<&Measured> = self.each.iter().map(|e| &e.measured).collect();
+        let mean = measure::mean(&measured);
+        let count = self.each.len() as f64;
+        let psnr = mean.as_ref().map_or(0.0, |mean| mean.errors.psnr_db);
+        let squares = measured.iter().map(|m| (m.errors.psnr_db - psnr).powi(2)).sum::<f64>();
+
+        let repeats = self.each.iter().map(|e| e.seconds.len()).min().unwrap_or(0);
+        let of_repeat = |r: usize| self.each.iter().map(|e| e.seconds[r]).sum::<f64>() / count;
+        let means: Vec<f64> = (0..repeats).map(of_repeat).collect();
+        let medians = self.each.iter().map(|e| measure::median(&mut e.seconds.clone()));
+        let least = means.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = means.iter().copied().fold(0.0, f64::max);
+        Row {
+            system: system.name.clone(),
+            splits: self.each.len(),
+            missing,
+            peak_bytes: self.peak_bytes,
+            seconds: (repeats > 0).then(|| medians.sum::<f64>() / count),
+            seconds_range: (repeats > 0).then_some([least, most]),
+            psnr_standard_error_db: (count > 1.0).then(|| (squares / (count - 1.0) / count).sqrt()),
+            mean,
+            each: self.each,
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! Models that other programs made, as rows of a table.
+
+use super::split::Split;
+use super::vehicles::Vehicle;
+use crate::job::{Failure, Result, USAGE};
+use crate::scene;
+use std::path::{Path, PathBuf};
+use vg::imports::{self, Up};
+use vg::io::ply;
+use vg::scene::Cloud;
+use vg::{Gaussians, View};
+
+/// Where the models of one program are.
+pub(crate) struct Import {
+    kind: Kind,
+    /// With `{scene}` and `{split}` in it.
+    pattern: String,
+    /// What one model took, as its maker measured it.
+    pub(crate) seconds: Option<f64>,
+}
+
+/// What a program writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// Depth Anything 3: a PLY for each view, in the cameras' world.
+    DepthAnything3,
+    /// TRELLIS: one object of unknown size and heading, -y up.
+    Trellis,
+    /// The same with z up.
+    Object,
+    /// In the vehicle's frame, metres.
+    Vehicle,
+}
+
+impl Import {
+    /// Of `NAME: KIND PATH [seconds=S]`.
+    pub(crate) fn read(text: &str) -> Result<(String, Self)> {
+        let wrong = |what: &str| Failure {
+            message: format!(
+                "--import \"{text}\": {what}; expected \"NAME: KIND PATH [seconds=S]\" with KIND da3, trellis, object \
+                 or vehicle"
+            ),
+            code: USAGE,
+        };
+        let (name, rest) = text.split_once(':').ok_or_else(|| wrong("no name before a colon"))?;
+        let (kind, rest) = rest.trim().split_once(char::is_whitespace).ok_or_else(|| wrong("no path"))?;
+        let kind = match kind {
+            "da3" => Kind::DepthAnything3,
+            "trellis" => Kind::Trellis,
+            "object" => Kind::Object,
+            "vehicle" => Kind::Vehicle,
+            _ => return Err(wrong("no such kind")),
+        };
+        let rest = rest.trim();
+        let (pattern, seconds) = match rest.rsplit_once("seconds=") {
+            Some((pattern, seconds)) => {
+                let seconds = seconds.parse().ok().filter(|s: &f64| *s > 0.0 && s.is_finite());
+                (pattern.trim(), Some(seconds.ok_or_else(|| wrong("seconds is no number above 0"))?))
+            }
+            None => (rest, None),
+        };
+        if pattern.is_empty() {
+            return Err(wrong("no path"));
+        }
+        Ok((name.trim().to_owned(), Self { kind, pattern: pattern.to_owned(), seconds }))
+    }
+
+    pub(crate) fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// The model of a split in the vehicle's frame.
+    pub(crate) fn model(
+        &self,
+        vehicle: &Vehicle,
+        key: &str,
+        split: &Split,
+        scan: Option<&Cloud>,
+    ) -> Result<Gaussians> {
+        let path = PathBuf::from(self.pattern.replace("{scene}", &vehicle.name).replace("{split}", key));
+        if self.kind == Kind::Vehicle {
+            return read(&path);
+        }
+        let views = scene::open(&vehicle.scene, &split.input, &vehicle.options(None))?.scene.views;
+        if self.kind == Kind::DepthAnything3 {
+            return of_views(&path, &views, vehicle);
+        }
+        let scan = scan.ok_or_else(|| {
+            Failure::job("has no frame of its own and is fitted to a scan: needs --scan P.ply")
+        })?;
+        let up = if self.kind == Kind::Trellis { Up::MinusY } else { Up::Z };
+        let placed = imports::place_object(&read(&path)?, up, scan, &views)?;
+        Ok(placed.gaussians)
+    }
+}
+
+/// A PLY for each view in a folder, or one of all, in the world of the scene's poses, or in that of the camera centres
+/// beside them.
+fn of_views(path: &Path, views: &[View], vehicle: &Vehicle) -> Result<Gaussians> {
+    let cameras = if path.is_dir() { path.join("cameras.json") } else { path.with_extension("cameras.json") };
+    let centers = cameras.is_file().then(|| vg::io::read_known_centers(&cameras)).transpose()?;
+    let parts = if path.is_dir() {
+        let of = |view: &View| read(&path.join(&view.name).with_extension("ply"));
+        views.iter().map(of).collect::<Result<Vec<_>>>()?
+    } else {
+        vec![read(path)?]
+    };
+    let parts = match &vehicle.vehicle_from_world {
+        Some(to_vehicle) if centers.is_none() => {
+            parts.iter().map(|part| part.transformed(to_vehicle)).collect::<vg::Result<Vec<_>>>()?
+        }
+        _ => parts,
+    };
+    Ok(imports::merge_views(&parts, views, centers.as_deref())?)
+}
+
+fn read(path: &Path) -> Result<Gaussians> {
+    let (gaussians, _) = ply::read(path)?;
+    Ok(gaussians)
+}
