@@ -3,11 +3,15 @@
 //! The photograph is composited on white with its mask, the render is drawn on white with its own alpha; both
 //! are compared over the full frame, unmasked, so what spills over the silhouette costs.
 
+mod lpips;
 mod ssim;
+mod surface;
 mod views;
 
+pub use lpips::{LPIPS_MIN_SIDE, Lpips};
 pub use ssim::ssim;
 pub(crate) use ssim::{Reference, WINDOW};
+pub use surface::{F_SCORE_M, SurfaceErrors, SurfaceOptions, visible_surface};
 pub use views::ViewErrors;
 
 use crate::scene::View;

@@ -16,14 +16,21 @@ pub struct Cloud(Arc<[[f32; 3]]>);
 impl Cloud {
     /// From at least one point and at most [`MAX_CLOUD_POINTS`].
     pub fn new(points: Vec<[f32; 3]>) -> Result<Self> {
+        Self::check("cloud", &points)?;
+        Ok(Self(points.into()))
+    }
+
+    /// Whether points can be a cloud; `argument` names them in the error.
+    pub(crate) fn check(argument: &str, points: &[[f32; 3]]) -> Result<()> {
         if points.is_empty() || points.len() > MAX_CLOUD_POINTS {
             let allowed = format!("1 to {MAX_CLOUD_POINTS} points");
-            return Err(Error::argument("cloud", format!("{} points", points.len()), allowed));
+            return Err(Error::argument(argument, format!("{} points", points.len()), allowed));
         }
         if let Some(i) = points.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
-            return Err(Error::argument(format!("cloud[{i}]"), format!("{:?}", points[i]), "finite, metres"));
+            let argument = format!("{argument}[{i}]");
+            return Err(Error::argument(argument, format!("{:?}", points[i]), "finite, metres"));
         }
-        Ok(Self(points.into()))
+        Ok(())
     }
 
     /// Vehicle frame, metres. `[n][3]`

@@ -12,6 +12,7 @@ mod c_abi;
 mod contract;
 mod depth;
 mod head;
+mod lpips;
 mod program;
 mod segment;
 
