@@ -144,15 +144,13 @@ fn masks_line(used: usize, scene: &MaskedViews) -> String {
 /// The library's argument as the user wrote it.
 fn named(error: Error, args: &AlignArgs, scan: &Path) -> Failure {
     match error {
-        Error::Argument { argument, found, allowed } => {
-            Failure::job(match argument.as_str() {
-                "heading" => format!("--heading: {found}; allowed: {allowed}"),
-                "scan" => format!("--scan {}: {found}; allowed: {allowed}", scan.display()),
-                "size" => format!("--box: {found}; allowed: {allowed}"),
-                "sparse" => format!("--box: {}: {found}; allowed: {allowed}", args.scene.display()),
-                other => format!("{}: {other}: {found}; allowed: {allowed}", args.scene.display()),
-            })
-        }
+        Error::Argument { argument, found, allowed } => Failure::job(match argument.as_str() {
+            "heading" => format!("--heading: {found}; allowed: {allowed}"),
+            "scan" => format!("--scan {}: {found}; allowed: {allowed}", scan.display()),
+            "size" => format!("--box: {found}; allowed: {allowed}"),
+            "sparse" => format!("--box: {}: {found}; allowed: {allowed}", args.scene.display()),
+            other => format!("{}: {other}: {found}; allowed: {allowed}", args.scene.display()),
+        }),
         other => other.into(),
     }
 }
