@@ -20,8 +20,13 @@ const NEIGHBOURS: usize = 12;
 /// A point whose neighbours are this many times farther than usual is alone.
 const ALONE: f64 = 3.0;
 
-/// A point this many times farther off its neighbours' plane than usual is not of their surface.
+/// A point this many times farther off its neighbours' plane than usual, and than they are themselves, is not of their
+/// surface.
 const OFF: f64 = 6.0;
+
+/// Neighbours this many times farther off their own plane than usual lie across an edge: the plane would cut it off,
+/// and outlines are made of edges.
+const ACROSS_EDGE: f64 = 1.5;
 
 /// Sizes of a vehicle, metres: the longest side of the scan's box.
 const SIZES_M: std::ops::RangeInclusive<f64> = 1.0..=25.0;
@@ -76,7 +81,8 @@ fn without_lonely(points: &[DVec3]) -> Vec<DVec3> {
     points.iter().zip(&reaches).filter(|(_, r)| **r <= limit).map(|(p, _)| *p).collect()
 }
 
-/// Each point moved to the plane of its neighbours, with that plane's normal; without those far off it.
+/// Each point moved to the plane of its neighbours where they lie on one, with that plane's normal; without those far
+/// off it.
 fn smoothed(points: &[DVec3]) -> (Vec<DVec3>, Vec<DVec3>) {
     let tree = Tree::new(points);
     let plane = |p: &DVec3| {
@@ -84,15 +90,31 @@ fn smoothed(points: &[DVec3]) -> (Vec<DVec3>, Vec<DVec3>) {
             tree.neighbours(*p, NEIGHBOURS).iter().map(|n| points[n.1 as usize]).collect();
         let others = &around[1.min(around.len())..];
         let (middle, normal) = plane_of(others);
-        let off = normal.dot(*p - middle);
-        // The point is one of the witnesses of where the surface is.
-        let moved = *p - off * normal * (others.len() as f64 / around.len().max(1) as f64);
-        (moved, normal, off.abs())
+        let squares: f64 = others.iter().map(|q| normal.dot(*q - middle).powi(2)).sum();
+        Plane { normal, off: normal.dot(*p - middle), thickness: (squares / others.len() as f64).sqrt() }
     };
-    let planes: Vec<(DVec3, DVec3, f64)> = points.par_iter().map(plane).collect();
-    let offs: Vec<f64> = planes.iter().map(|p| p.2).collect();
-    let limit = OFF * median(&offs) + 1e-6;
-    planes.into_iter().filter(|p| p.2 <= limit && p.1.is_finite()).map(|(p, n, _)| (p, n)).unzip()
+    let planes: Vec<Plane> = points.par_iter().map(plane).collect();
+    let usual = |of: fn(&Plane) -> f64| median(&planes.iter().map(of).collect::<Vec<f64>>());
+    let (off, thickness) = (usual(|p| p.off.abs()), usual(|p| p.thickness));
+    let is_of_surface =
+        |plane: &Plane| plane.off.abs() <= OFF * off.max(plane.thickness) + 1e-6 && plane.normal.is_finite();
+    let kept = points.iter().zip(&planes).filter(|(_, plane)| is_of_surface(plane));
+    let settled = |(p, plane): (&DVec3, &Plane)| {
+        // The point is one of the witnesses of where the surface is.
+        let share = (NEIGHBOURS - 1) as f64 / NEIGHBOURS as f64;
+        let is_flat = plane.thickness <= ACROSS_EDGE * thickness + 1e-6;
+        (if is_flat { *p - share * plane.off * plane.normal } else { *p }, plane.normal)
+    };
+    kept.map(settled).unzip()
+}
+
+/// The plane of a point's neighbours.
+struct Plane {
+    normal: DVec3,
+    /// Of the point.
+    off: f64,
+    /// How far they lie off it themselves, root mean square.
+    thickness: f64,
 }
 
 /// Middle and unit normal of the plane through points.

@@ -1,6 +1,7 @@
 //! What several test programs share: a seeded generator, scenes, and comparison of pictures.
 #![allow(dead_code, unreachable_pub)] // each program uses a part, through a module of its own
 
+pub mod boxes;
 pub mod golden;
 pub mod gradients;
 pub mod npz;
