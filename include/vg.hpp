@@ -919,6 +919,62 @@ inline Result<void> render_with_gradients(Gradients &out, const vg_image_target 
     return detail::render_backward_into(out, gaussians, camera, planes, &target, options);
 }
 
+// ---- Metrics
+
+/// Settings of a measure.
+struct MetricsOptions : vg_metrics_options {
+    MetricsOptions() noexcept : vg_metrics_options{} {
+        vg_metrics_options_init(this, sizeof(vg_metrics_options));
+    }
+
+    /// A network that measures LPIPS: lent, and needed until the call returns. A temporary is refused.
+    void lend_lpips(const Model &model) noexcept { lpips = model.get(); }
+    void lend_lpips(const Model &&) = delete;
+};
+
+/// The difference of two pictures of one size; NAN where a measure does not exist.
+inline Result<vg_picture_errors> picture_errors(const vg_image &a, const vg_image &b,
+                                                const MetricsOptions &options = {}) {
+    vg_picture_errors errors;
+    vg_picture_errors_init(&errors, sizeof errors);
+    const Result<void> measured = detail::done(
+        [&](vg_error **error) { return vg_metrics_pictures(&a, &b, &options, &errors, error); });
+    if (!measured) {
+        return measured.error();
+    }
+    return errors;
+}
+
+/// The error of a model, drawn on white, in one photograph; NAN where a measure does not exist.
+inline Result<vg_view_errors> view_errors(const Gaussians &gaussians, const vg_view &view,
+                                          const MetricsOptions &options = {}) {
+    vg_view_errors errors;
+    vg_view_errors_init(&errors, sizeof errors);
+    const Result<void> measured = detail::done([&](vg_error **error) {
+        return vg_metrics_view(gaussians.get(), &view, &options, &errors, error);
+    });
+    if (!measured) {
+        return measured.error();
+    }
+    return errors;
+}
+
+/// The error of a model's surface against points measured on the vehicle, metres, vehicle frame.
+inline Result<vg_surface_errors> surface_errors(const Gaussians &gaussians,
+                                                const std::vector<std::array<float, 3>> &points,
+                                                const MetricsOptions &options = {}) {
+    vg_surface_errors errors;
+    vg_surface_errors_init(&errors, sizeof errors);
+    const float *first = points.empty() ? nullptr : points.front().data();
+    const Result<void> measured = detail::done([&](vg_error **error) {
+        return vg_metrics_surface(gaussians.get(), first, points.size(), &options, &errors, error);
+    });
+    if (!measured) {
+        return measured.error();
+    }
+    return errors;
+}
+
 // ---- OpenCV
 
 #ifdef VG_HAS_OPENCV

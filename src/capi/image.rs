@@ -131,6 +131,46 @@ pub(super) unsafe fn depth(argument: &str, image: &vg_image) -> Result<Option<De
     DepthMap::new(image.width, image.height, depth).map(Some)
 }
 
+/// A picture as it looks on white, RGB in [0, 1]. `[height * width]`
+pub(super) unsafe fn on_white(argument: &str, image: &vg_image) -> Result<Vec<[f32; 3]>> {
+    const WITH_ALPHA: [(i32, &str, [usize; 3]); 2] =
+        [(vg_format::Rgba8 as i32, "RGBA8", [0, 1, 2]), (vg_format::Bgra8 as i32, "BGRA8", [2, 1, 0])];
+    read::not_null(&format!("{argument}.data"), image.data, "the picture's pixels")?;
+    let (width, height) = (image.width as usize, image.height as usize);
+    let over = |rgb: [f32; 3], alpha: f32| rgb.map(|c| alpha * c + (1.0 - alpha));
+    let mut pixels = Vec::new();
+    if let Some((.., order)) = WITH_ALPHA.into_iter().find(|(n, ..)| *n == image.format) {
+        format_of(argument, image, &WITH_ALPHA)?;
+        let (bytes, stride) = unsafe { bytes(argument, image, 4)? };
+        for v in 0..height {
+            let row = bytes[v * stride..][..4 * width].as_chunks::<4>().0;
+            let byte = |b: u8| f32::from(b) / 255.0;
+            pixels.extend(row.iter().map(|p| over(order.map(|k| byte(p[k])), byte(p[3]))));
+        }
+        return Ok(pixels);
+    }
+    if image.format == vg_format::Rgba32f as i32 {
+        const CHANNEL: usize = size_of::<f32>();
+        format_of(argument, image, &[(vg_format::Rgba32f as i32, "RGBA32F", ())])?;
+        let (bytes, stride) = unsafe { bytes(argument, image, 4 * CHANNEL)? };
+        for v in 0..height {
+            // Read bytewise: rows need not be aligned to floats.
+            for (u, p) in bytes[v * stride..][..4 * CHANNEL * width].as_chunks::<16>().0.iter().enumerate() {
+                let p: [f32; 4] = bytemuck::pod_read_unaligned(p);
+                if !p.iter().all(|c| c.is_finite()) {
+                    let at = format!("{argument}, column {u}, row {v}");
+                    return Err(Error::argument(at, format!("{p:?}"), "finite"));
+                }
+                let [r, g, b, alpha] = p;
+                pixels.push(over([r, g, b], alpha.clamp(0.0, 1.0)));
+            }
+        }
+        return Ok(pixels);
+    }
+    let (picture, _) = unsafe { photograph(argument, image)? };
+    Ok(picture.pixels().iter().map(|p| p.map(|c| f32::from(c) / 255.0)).collect())
+}
+
 /// The picture's format, one of these, and nothing in it that a later version may have a meaning for.
 fn format_of<T: Copy>(argument: &str, image: &vg_image, formats: &[(i32, &str, T)]) -> Result<T> {
     read::zero(&format!("{argument}.flags"), image.flags == 0)?;

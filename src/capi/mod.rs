@@ -45,6 +45,8 @@ mod gradient;
 
 mod segment;
 
+mod metrics;
+
 mod scene;
 
 #[cfg(test)]
@@ -55,6 +57,7 @@ pub use context::*;
 pub use gaussians::*;
 pub use gradient::*;
 pub use image::*;
+pub use metrics::*;
 pub use model::*;
 pub use options::*;
 pub use reconstruct::*;

@@ -53,12 +53,14 @@ fn layout_of_rust() -> String {
             struct_size width height color color_row_stride depth depth_row_stride color_format flags alpha
             alpha_row_stride
         }
+        vg_metrics_options { struct_size context lpips f_score_m flags }
         vg_model_options { struct_size runtime provider fall_back threads prepack arena flags }
         vg_options {
             struct_size context prior symmetry sh_degree keep check points vehicle_size progress progress_user log
             log_user calibrate relight photo flags budget_s cloud cloud_count resolution
             max_views prior_model head_model refine_seconds refine_iterations refine_hold_out
         }
+        vg_picture_errors { struct_size psnr_db ssim lpips }
         vg_render_options {
             struct_size context backend background background_color alpha depth_mode sh_degree antialiased blur
             near_plane far_plane max_alpha flags
@@ -73,7 +75,12 @@ fn layout_of_rust() -> String {
             struct_size context vehicle_from_world names name_count depth_scale load_depth flags log log_user
         }
         vg_segment_options { struct_size context flags }
+        vg_surface_errors {
+            struct_size accuracy_m completeness_m chamfer_m precision recall f_score length_error_percent
+            width_error_percent height_error_percent
+        }
         vg_view { struct_size name camera image mask depth }
+        vg_view_errors { struct_size psnr_db psnr_box_db ssim lpips silhouette_iou depth_mae_m depth_p90_m }
     }
     lines
 }
@@ -151,6 +158,16 @@ fn vg_abi_witness_more(
     _: &vg_scene_options,
     _: &vg_segment_options,
     _: &vg_view,
+) {
+}
+
+/// Those of the metrics.
+#[safer_ffi::ffi_export]
+fn vg_abi_witness_metrics(
+    _: &vg_metrics_options,
+    _: &vg_picture_errors,
+    _: &vg_view_errors,
+    _: &vg_surface_errors,
 ) {
 }
 
@@ -250,6 +267,13 @@ fn every_function() -> Vec<(&'static str, Call)> {
         vg_render_backward(null(), null(), null(), null(), null(), null()) reports;
         vg_segment_options_init(null_mut(), 0) status;
         vg_segment(null(), null(), null(), null(), null_mut(), 0) reports;
+        vg_metrics_options_init(null_mut(), 0) status;
+        vg_picture_errors_init(null_mut(), 0) status;
+        vg_view_errors_init(null_mut(), 0) status;
+        vg_surface_errors_init(null_mut(), 0) status;
+        vg_metrics_pictures(null(), null(), null(), null_mut()) reports;
+        vg_metrics_view(null(), null(), null(), null_mut()) reports;
+        vg_metrics_surface(null(), null(), 0, null(), null_mut()) reports;
         vg_scene_options_init(null_mut(), 0) status;
         vg_colmap_open(null(), null(), null_mut()) reports;
         vg_transforms_open(null(), null(), null_mut()) reports;

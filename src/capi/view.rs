@@ -63,7 +63,8 @@ pub(super) unsafe fn scene(views: *const vg_view, count: usize) -> Result<Scene>
     Ok(Scene { views: views.iter().enumerate().map(view).collect::<Result<_>>()?, cloud: None })
 }
 
-unsafe fn view_of(argument: &str, view: &vg_view) -> Result<View> {
+/// One of them.
+pub(super) unsafe fn view_of(argument: &str, view: &vg_view) -> Result<View> {
     let part = |name: &str| format!("{argument}.{name}");
     unsafe {
         let name = read::text(&part("name"), view.name)?.to_owned();

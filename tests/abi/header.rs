@@ -4,7 +4,7 @@ use crate::tools::{STRICT, assert_golden, cc, cxx, have, root, run, scratch};
 use std::process::Command;
 
 /// The chapters of the header.
-const CHAPTERS: [&str; 15] = [
+const CHAPTERS: [&str; 16] = [
     "version",
     "status",
     "context",
@@ -19,6 +19,7 @@ const CHAPTERS: [&str; 15] = [
     "render",
     "gradient",
     "segment",
+    "metrics",
     "scene",
 ];
 

@@ -332,6 +332,33 @@ void gradients_own_their_numbers_and_a_loss_sees_the_picture(const vg::Gaussians
 
 } // namespace
 
+void models_are_measured(const vg::Gaussians &ball) {
+    const Photographs photographs;
+    const vg_view view = photographs.view();
+    const vg_view_errors seen = vg::view_errors(ball, view).take();
+    CHECK(seen.psnr_db > 15 && seen.ssim > 0.5 && seen.silhouette_iou > 0.9 && seen.depth_mae_m < 0.1);
+    CHECK(std::isnan(seen.lpips));
+    CHECK(vg::picture_errors(view.image, view.image)->ssim == 1);
+
+    std::vector<std::array<float, 3>> points(ball.size());
+    const vg::Span<const float> centres = ball.positions();
+    for (std::size_t i = 0; i < points.size(); i++) {
+        points[i] = {centres[3 * i], centres[3 * i + 1], centres[3 * i + 2]};
+    }
+    vg::MetricsOptions options;
+    CHECK(options.f_score_m == 0.05);
+    CHECK(vg::surface_errors(ball, points, options)->accuracy_m < 0.1);
+    CHECK(failed(vg::surface_errors(ball, {}), VG_STATUS_ARGUMENT, "point_count: 0"));
+    options.f_score_m = 0;
+    CHECK(failed(vg::surface_errors(ball, points, options), VG_STATUS_ARGUMENT, "options.f_score_m"));
+    const vg::Model empty;
+    options.lend_lpips(empty);
+    CHECK(options.lpips == nullptr);
+    vg_image smaller = view.image;
+    smaller.height -= 1;
+    CHECK(failed(vg::picture_errors(view.image, smaller), VG_STATUS_ARGUMENT, "b: "));
+}
+
 int main(int argc, char **argv) {
     CHECK(argc == 2);
     CHECK(std::string(vg::version()).find('.') != std::string::npos);
@@ -348,5 +375,6 @@ int main(int argc, char **argv) {
     gaussians_are_saved_derived_and_made_of_arrays(made.gaussians, argv[1]);
     pictures_own_their_pixels(made.gaussians);
     gradients_own_their_numbers_and_a_loss_sees_the_picture(made.gaussians);
+    models_are_measured(made.gaussians);
     return 0;
 }

@@ -40,6 +40,7 @@ pub(crate) fn from_library(py: Python<'_>, error: vg::Error) -> PyErr {
         vg::Error::Argument { argument, found, allowed } => {
             let argument = argument.strip_prefix("options.").unwrap_or(&argument);
             let argument = argument.replace("rotations", "quats").replace("budget_s", "budget");
+            let argument = argument.replace("f_score_m", "f_score").replace("scan", "points");
             format!("{}; allowed: {allowed}", [&argument, &*found].join(": "))
         }
         vg::Error::NotBuilt { argument, found, remedy } => {

@@ -9,6 +9,7 @@ mod arrays;
 mod camera;
 mod errors;
 mod gaussians;
+mod metrics;
 mod model;
 mod reconstruct;
 mod scene;
@@ -23,6 +24,8 @@ mod _native {
     use crate::errors::panic_on_a_worker_thread;
     #[pymodule_export]
     use crate::gaussians::Gaussians;
+    #[pymodule_export]
+    use crate::metrics::{picture_errors, surface_errors, view_errors};
     #[pymodule_export]
     use crate::model::{Model, segment};
     #[pymodule_export]

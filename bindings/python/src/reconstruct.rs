@@ -180,11 +180,11 @@ fn scene_of(
         let camera = camera.get().inner;
         let (image, cut_out) = picture(image, &format!("images[{i}]"), &camera)?;
         let mask = match masks.map(|list| &list[i]).filter(|o| !o.is_none()) {
-            Some(object) => Some(mask(object, i, &camera)?),
+            Some(object) => Some(mask(object, &format!("masks[{i}]"), &camera)?),
             None => cut_out,
         };
         let depth = depths.map(|list| &list[i]).filter(|o| !o.is_none());
-        let depth = depth.map(|object| self::depth(object, i, &camera)).transpose()?;
+        let depth = depth.map(|object| self::depth(object, &format!("depths[{i}]"), &camera)).transpose()?;
         let name = names.as_ref().map_or_else(|| format!("{i:03}"), |names| names[i].clone());
         Ok(View { name, camera, image, mask, depth })
     });
@@ -222,23 +222,22 @@ pub(crate) fn picture(
     Ok((image, Some(mask)))
 }
 
-fn mask(object: &Bound<'_, PyAny>, i: usize, camera: &vg::Camera) -> PyResult<Mask> {
+pub(crate) fn mask(object: &Bound<'_, PyAny>, argument: &str, camera: &vg::Camera) -> PyResult<Mask> {
     let py = object.py();
-    let argument = format!("masks[{i}]");
     let allowed = "a NumPy array of bool, or of uint8 where 128 and above is vehicle, (height, width)";
     // Of one byte each, 0 or 1.
     let is_bool = object.cast::<PyUntypedArray>().is_ok_and(|a| numpy_is_bool(py, a));
     let labels: Vec<u8>;
     let bytes;
     let (shape, data) = if is_bool {
-        let flags = array::<bool>(object, &argument, allowed)?;
+        let flags = array::<bool>(object, argument, allowed)?;
         labels = values(&flags)?.iter().map(|&v| if v { u8::MAX } else { 0 }).collect();
         (flags.shape().to_vec(), &labels[..])
     } else {
-        bytes = array::<u8>(object, &argument, allowed)?;
+        bytes = array::<u8>(object, argument, allowed)?;
         (bytes.shape().to_vec(), values(&bytes)?)
     };
-    same_size(py, &argument, &shape, camera)?;
+    same_size(py, argument, &shape, camera)?;
     let largest = data.iter().copied().max().unwrap_or(0);
     if (1..VEHICLE_THRESHOLD).contains(&largest) {
         let text = format!(
@@ -246,7 +245,7 @@ fn mask(object: &Bound<'_, PyAny>, i: usize, camera: &vg::Camera) -> PyResult<Ma
         );
         warn(py, &text)?;
     }
-    Mask::from_strided(&argument, data, camera.width, camera.height, camera.width as usize)
+    Mask::from_strided(argument, data, camera.width, camera.height, camera.width as usize)
         .map_err(|e| from_library(py, e))
 }
 
@@ -255,13 +254,12 @@ fn numpy_is_bool(py: Python<'_>, array: &Bound<'_, PyUntypedArray>) -> bool {
     array.dtype().is_equiv_to(&numpy::dtype::<bool>(py))
 }
 
-fn depth(object: &Bound<'_, PyAny>, i: usize, camera: &vg::Camera) -> PyResult<DepthMap> {
+pub(crate) fn depth(object: &Bound<'_, PyAny>, argument: &str, camera: &vg::Camera) -> PyResult<DepthMap> {
     let py = object.py();
-    let argument = format!("depths[{i}]");
-    let metres = array::<f32>(object, &argument, "a NumPy array of float32, metres, (height, width)")?;
-    same_size(py, &argument, metres.shape(), camera)?;
+    let metres = array::<f32>(object, argument, "a NumPy array of float32, metres, (height, width)")?;
+    same_size(py, argument, metres.shape(), camera)?;
     let stride = camera.width as usize;
-    DepthMap::from_strided(&argument, values(&metres)?, camera.width, camera.height, stride)
+    DepthMap::from_strided(argument, values(&metres)?, camera.width, camera.height, stride)
         .map_err(|e| from_library(py, e))
 }
 

@@ -815,7 +815,7 @@ const SIMILARITY: [f64; 16] =
 const POSE: [f64; 12] = [0.0, -1.0, 0.0, 4e5, 1.0, 0.0, 0.0, 5e6, 0.0, 0.0, 1.0, 100.0];
 
 /// A call that works, for each function that can fail.
-pub const CALLS: [fn(&World) -> Call; 40] = [
+pub const CALLS: [fn(&World) -> Call; 47] = [
     context_options_init,
     context_new,
     camera_init,
@@ -852,6 +852,13 @@ pub const CALLS: [fn(&World) -> Call; 40] = [
     render_backward_with_a_picture,
     segment_options_init,
     segment,
+    metrics_options_init,
+    picture_errors_init,
+    view_errors_init,
+    surface_errors_init,
+    metrics_pictures,
+    metrics_view,
+    metrics_surface,
     scene_options_init,
     colmap_open,
     transforms_open,
@@ -859,7 +866,7 @@ pub const CALLS: [fn(&World) -> Call; 40] = [
 ];
 
 /// `sizeof` in the release that introduced them: no caller has shorter ones.
-pub const FIRST_SIZES: [(&str, usize); 13] = [
+pub const FIRST_SIZES: [(&str, usize); 17] = [
     ("vg_context_options", 16),
     ("vg_camera", 280),
     ("vg_view", 392),
@@ -872,6 +879,10 @@ pub const FIRST_SIZES: [(&str, usize); 13] = [
     ("vg_image_gradient", 88),
     ("vg_gradients", 88),
     ("vg_segment_options", 24),
+    ("vg_metrics_options", 40),
+    ("vg_picture_errors", 32),
+    ("vg_view_errors", 64),
+    ("vg_surface_errors", 80),
     ("vg_scene_options", 72),
 ];
 
@@ -906,6 +917,10 @@ init_of!(image_target_init, vg_image_target_init, "target", target([(0, 0); 3]))
 init_of!(image_gradient_init, vg_image_gradient_init, "gradient", image_gradient([0; 3]));
 init_of!(gradients_init, vg_gradients_init, "gradients", gradients(0, 0, [0; 8]));
 init_of!(segment_options_init, vg_segment_options_init, "options", segment_options(0));
+init_of!(metrics_options_init, vg_metrics_options_init, "options", metrics_options(0));
+init_of!(picture_errors_init, vg_picture_errors_init, "errors", picture_errors());
+init_of!(view_errors_init, vg_view_errors_init, "errors", view_errors());
+init_of!(surface_errors_init, vg_surface_errors_init, "errors", surface_errors());
 init_of!(scene_options_init, vg_scene_options_init, "options", scene_options(0));
 
 fn context_options() -> Lent {
@@ -1519,6 +1534,107 @@ pub fn segment(w: &World) -> Call {
     call.good = if vg::onnx::is_built() { vg_status::Argument } else { vg_status::NotBuilt };
     call
 }
+
+fn metrics_options(context: usize) -> Lent {
+    let fields = fields!(vg_metrics_options {
+        struct_size: elsewhere(),
+        context: elsewhere(),
+        lpips: elsewhere(),
+        f_score_m: within64(1e-3, 1e3),
+        flags: vec![(0, Fine), (1, Refused), (1 << 63, Refused)],
+    });
+    let mut lent = Lent::zeroed::<vg_metrics_options>("vg_metrics_options", fields);
+    lent.put("context", 0, context as u64);
+    lent.put("f_score_m", 0, 0.05f64.to_bits());
+    lent
+}
+
+fn picture_errors() -> Lent {
+    let fields = fields!(vg_picture_errors {
+        struct_size: elsewhere(),
+        psnr_db: elsewhere(),
+        ssim: elsewhere(),
+        lpips: elsewhere(),
+    });
+    Lent::zeroed::<vg_picture_errors>("vg_picture_errors", fields)
+}
+
+fn view_errors() -> Lent {
+    let fields = fields!(vg_view_errors {
+        struct_size: elsewhere(),
+        psnr_db: elsewhere(),
+        psnr_box_db: elsewhere(),
+        ssim: elsewhere(),
+        lpips: elsewhere(),
+        silhouette_iou: elsewhere(),
+        depth_mae_m: elsewhere(),
+        depth_p90_m: elsewhere(),
+    });
+    Lent::zeroed::<vg_view_errors>("vg_view_errors", fields)
+}
+
+fn surface_errors() -> Lent {
+    let fields = fields!(vg_surface_errors {
+        struct_size: elsewhere(),
+        accuracy_m: elsewhere(),
+        completeness_m: elsewhere(),
+        chamfer_m: elsewhere(),
+        precision: elsewhere(),
+        recall: elsewhere(),
+        f_score: elsewhere(),
+        length_error_percent: elsewhere(),
+        width_error_percent: elsewhere(),
+        height_error_percent: elsewhere(),
+    });
+    Lent::zeroed::<vg_surface_errors>("vg_surface_errors", fields)
+}
+
+/// Two photographs, one with gaps between its rows and one with alpha, at odd addresses.
+pub fn metrics_pictures(w: &World) -> Call {
+    let mut memory = Vec::new();
+    let mut picture = |i: usize| {
+        let view = w.photographs[i].view(i, &mut memory);
+        memory.push(Memory::of(&[view.image], 3));
+        memory.last_mut().expect("a picture").pointer()
+    };
+    let (a, b) = (picture(0), picture(2));
+    Call::new("vg_metrics_pictures", invoke!(vg_metrics_pictures 0 1 2 3))
+        .argument("a", Value::Handle(a))
+        .argument("b", Value::Handle(b))
+        .argument("options", Value::Struct(metrics_options(w.context)))
+        .nullable()
+        .argument("out", Value::OutStruct(picture_errors()))
+        .memory(memory)
+}
+
+pub fn metrics_view(w: &World) -> Call {
+    let mut memory = Vec::new();
+    let view = w.photographs[0].view(0, &mut memory);
+    Call::new("vg_metrics_view", invoke!(vg_metrics_view 0 1 2 3))
+        .argument("gaussians", Value::Handle(w.few))
+        .argument("view", Value::Struct(Lent::new("vg_view", &[view], view_fields())))
+        .argument("options", Value::Struct(metrics_options(w.context)))
+        .nullable()
+        .argument("out", Value::OutStruct(view_errors()))
+        .memory(memory)
+}
+
+/// Points that lie anywhere: whether they fit the model is not looked at.
+pub fn metrics_surface(w: &World) -> Call {
+    let points: Vec<f32> = (0..3 * SCAN_POINTS).map(|i| (i as f32).sin()).collect();
+    let mut points = Memory::of(&points, 0);
+    Call::new("vg_metrics_surface", invoke!(vg_metrics_surface 0 1 2 3 4))
+        .argument("gaussians", Value::Handle(w.gaussians))
+        .argument("points", Value::Handle(points.pointer()))
+        .argument("point_count", Value::Number(SCAN_POINTS as u64))
+        .tries(counts(&[0, 10_000_001, 1 << 60, u64::MAX]))
+        .argument("options", Value::Struct(metrics_options(w.context)))
+        .nullable()
+        .argument("out", Value::OutStruct(surface_errors()))
+        .memory(vec![points])
+}
+
+const SCAN_POINTS: usize = 20;
 
 fn scene_options(context: usize) -> Lent {
     let fields = fields!(vg_scene_options {

@@ -13,6 +13,8 @@ Quaternions are (w, x, y, z). Pictures are RGB, row 0 at the top.
 
 from ._errors import Status, VgError
 from ._gradients import Gradients, Planes
+from ._measures import PictureErrors, SurfaceErrors, ViewErrors
+from ._metrics import picture_errors, surface_errors, view_errors
 from ._native import (
     Camera,
     Gaussians,
@@ -32,18 +34,24 @@ __all__ = [
     "Gaussians",
     "Gradients",
     "Model",
+    "PictureErrors",
     "Planes",
     "Points",
     "Reconstruction",
     "Scene",
     "Status",
+    "SurfaceErrors",
     "VgError",
+    "ViewErrors",
     "__version__",
     "open_scene",
+    "picture_errors",
     "pose_from_box",
     "pose_from_colmap",
     "pose_from_opengl",
     "reconstruct",
     "segment",
     "similarity_from_points",
+    "surface_errors",
+    "view_errors",
 ]

@@ -15,12 +15,15 @@ __all__ = [
     "__version__",
     "_panic_on_a_worker_thread",
     "open_scene",
+    "picture_errors",
     "pose_from_box",
     "pose_from_colmap",
     "pose_from_opengl",
     "reconstruct",
     "segment",
     "similarity_from_points",
+    "surface_errors",
+    "view_errors",
 ]
 
 __version__: str
@@ -212,6 +215,27 @@ def pose_from_opengl(
 ) -> npt.NDArray[np.float64]: ...
 def pose_from_box(ego_from_vehicle: npt.ArrayLike, ego_from_camera: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
 def similarity_from_points(source: npt.ArrayLike, target: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
+def picture_errors(
+    a: npt.NDArray[np.generic],
+    b: npt.NDArray[np.generic],
+    lpips: Model | None,
+    threads: int,
+) -> tuple[float, float | None, float | None]: ...
+def view_errors(
+    gaussians: Gaussians,
+    image: npt.NDArray[np.uint8],
+    mask: npt.NDArray[np.generic] | None,
+    camera: Camera,
+    depth: npt.NDArray[np.float32] | None,
+    lpips: Model | None,
+    threads: int,
+) -> tuple[float, float | None, float | None, float | None, float, float | None, float | None]: ...
+def surface_errors(
+    gaussians: Gaussians,
+    points: npt.NDArray[np.float32],
+    f_score: float,
+    threads: int,
+) -> list[float]: ...
 def segment(
     model: Model,
     image: npt.NDArray[np.uint8],

@@ -35,6 +35,7 @@ import numpy.typing as npt
 
 from ._errors import Status, VgError
 from ._gradients import Gradients, Planes
+from ._measures import PictureErrors, SurfaceErrors, ViewErrors
 
 #: The binary interface that this module is written for.
 ABI_VERSION = 0
@@ -341,6 +342,28 @@ class vg_segment_options(ct.Structure):
     _fields_ = (("struct_size", ct.c_size_t), ("context", ct.c_void_p), ("flags", ct.c_uint64))
 
 
+class vg_metrics_options(ct.Structure):
+    _fields_ = (
+        ("struct_size", ct.c_size_t),
+        ("context", ct.c_void_p),
+        ("lpips", ct.c_void_p),
+        ("f_score_m", ct.c_double),
+        ("flags", ct.c_uint64),
+    )
+
+
+class vg_picture_errors(ct.Structure):
+    _fields_ = (("struct_size", ct.c_size_t), *((name, ct.c_double) for name in PictureErrors._fields))
+
+
+class vg_view_errors(ct.Structure):
+    _fields_ = (("struct_size", ct.c_size_t), *((name, ct.c_double) for name in ViewErrors._fields))
+
+
+class vg_surface_errors(ct.Structure):
+    _fields_ = (("struct_size", ct.c_size_t), *((name, ct.c_double) for name in SurfaceErrors._fields))
+
+
 class vg_scene_options(ct.Structure):
     _fields_ = (
         ("struct_size", ct.c_size_t),
@@ -444,6 +467,22 @@ PROTOTYPES: Mapping[str, tuple[Any, tuple[Any, ...]]] = {
     "vg_segment": (
         _i32,
         (_handle, _pointer(vg_image), _pointer(vg_camera), _pointer(vg_segment_options), _numbers, _size, _out),
+    ),
+    "vg_metrics_options_init": (_i32, (_pointer(vg_metrics_options), _size)),
+    "vg_picture_errors_init": (_i32, (_pointer(vg_picture_errors), _size)),
+    "vg_view_errors_init": (_i32, (_pointer(vg_view_errors), _size)),
+    "vg_surface_errors_init": (_i32, (_pointer(vg_surface_errors), _size)),
+    "vg_metrics_pictures": (
+        _i32,
+        (_pointer(vg_image), _pointer(vg_image), _pointer(vg_metrics_options), _pointer(vg_picture_errors), _out),
+    ),
+    "vg_metrics_view": (
+        _i32,
+        (_handle, _pointer(vg_view), _pointer(vg_metrics_options), _pointer(vg_view_errors), _out),
+    ),
+    "vg_metrics_surface": (
+        _i32,
+        (_handle, _numbers, _size, _pointer(vg_metrics_options), _pointer(vg_surface_errors), _out),
     ),
     "vg_scene_options_init": (_i32, (_pointer(vg_scene_options), _size)),
     "vg_colmap_open": (_i32, (_text, _pointer(vg_scene_options), _out, _out)),
@@ -1182,6 +1221,85 @@ def segment(
     mask = np.empty((picture.height, picture.width), np.uint8)
     _call("vg_segment", model, ct.byref(picture), ct.byref(posed), ct.byref(options), mask.ctypes.data, 0)
     return mask
+
+
+def _metrics_options(lpips: Model | None, f_score: float, context: Context | None) -> vg_metrics_options:
+    options: vg_metrics_options = _initial(vg_metrics_options)
+    options.context = None if context is None else context._as_parameter_
+    options.lpips, options.f_score_m = _lent_model(lpips, "lpips"), f_score
+    return options
+
+
+def _measures(errors: ct.Structure) -> list[float | None]:
+    """All fields but the size; NAN is None."""
+    values = (getattr(errors, field[0]) for field in errors._fields_[1:])
+    return [None if value != value else value for value in values]
+
+
+def _picture(array: npt.NDArray[Any], argument: str, alive: list[Any]) -> vg_image:
+    _expect(array, argument, np.uint8, np.float32)
+    if array.dtype == np.uint8:
+        return _photograph(array, argument, alive)
+    if array.ndim != 3 or array.shape[2] not in (3, 4):
+        raise VgError(Status.ARGUMENT, f"{argument}: shape {array.shape}; allowed: (height, width, 3 or 4)")
+    if array.shape[2] == 3:
+        array = np.concatenate([array, np.ones_like(array[..., :1])], axis=2)
+    return _lent(array, Format.RGBA32F, alive)
+
+
+def picture_errors(
+    a: npt.NDArray[Any], b: npt.NDArray[Any], *, lpips: Model | None = None, context: Context | None = None
+) -> PictureErrors:
+    """The difference of two pictures of one size, uint8 or float32 in [0, 1], (height, width, 3 or 4).
+
+    What their alpha leaves open is white.
+    """
+    alive: list[Any] = []
+    pictures = _picture(a, "a", alive), _picture(b, "b", alive)
+    options, errors = _metrics_options(lpips, 0.05, context), _initial(vg_picture_errors)
+    _call("vg_metrics_pictures", *map(ct.byref, pictures), ct.byref(options), ct.byref(errors))
+    return PictureErrors(*_measures(errors))  # type: ignore[arg-type]
+
+
+def view_errors(
+    gaussians: Gaussians,
+    image: npt.NDArray[np.uint8],
+    mask: npt.NDArray[Any] | None,
+    camera: Camera,
+    depth: npt.NDArray[np.float32] | None = None,
+    *,
+    lpips: Model | None = None,
+    context: Context | None = None,
+) -> ViewErrors:
+    """The error of a model, drawn on white, in one photograph, which its mask puts on white."""
+    alive: list[Any] = []
+    view = _initial(vg_view)
+    view.camera, view.image = _camera(camera), _photograph(image, "image", alive)
+    if mask is not None:
+        view.mask = _mask(mask, "mask", alive)
+    if depth is not None:
+        view.depth = _plane(depth, "depth", np.float32, Format.DEPTH32F, alive)
+    options, errors = _metrics_options(lpips, 0.05, context), _initial(vg_view_errors)
+    _call("vg_metrics_view", gaussians, ct.byref(view), ct.byref(options), ct.byref(errors))
+    return ViewErrors(*_measures(errors))  # type: ignore[arg-type]
+
+
+def surface_errors(
+    gaussians: Gaussians, points: npt.NDArray[np.float32], *, f_score: float = 0.05, context: Context | None = None
+) -> SurfaceErrors:
+    """The error of a model's surface against points measured on the vehicle: float32 (n, 3), metres, its frame.
+
+    f_score: the distance below which a point counts as met, metres.
+    """
+    _expect(points, "points", np.float32)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise VgError(Status.ARGUMENT, f"points: shape {points.shape}; allowed: (n, 3)")
+    points = np.require(points, requirements=["C", "A"])
+    options, errors = _metrics_options(None, f_score, context), _initial(vg_surface_errors)
+    _call(
+        "vg_metrics_surface", gaussians, points.ctypes.data, len(points), ct.byref(options), ct.byref(errors)
+    )
+    return SurfaceErrors(*_measures(errors))  # type: ignore[arg-type]
 
 
 class Scene(NamedTuple):

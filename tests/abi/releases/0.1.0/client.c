@@ -565,6 +565,40 @@ static void go_back(vg_context *context) {
     vg_gaussians_free(wanted);
 }
 
+/* The model against what it was made of, and against its own centres. */
+static void measure(const vg_gaussians *car, const vg_view *view, vg_context *context) {
+    vg_metrics_options options;
+    vg_picture_errors pictures;
+    vg_view_errors seen;
+    vg_surface_errors surface;
+    vg_error *error = NULL;
+    const float *centres = vg_gaussians_positions(car);
+    size_t count = vg_gaussians_count(car);
+
+    CHECK(vg_metrics_options_init(&options, sizeof options) == VG_STATUS_OK);
+    CHECK(options.lpips == NULL && options.f_score_m == 0.05);
+    options.context = context;
+    CHECK(vg_picture_errors_init(&pictures, sizeof pictures) == VG_STATUS_OK && isnan(pictures.ssim));
+    CHECK(vg_view_errors_init(&seen, sizeof seen) == VG_STATUS_OK && isnan(seen.ssim));
+    CHECK(vg_surface_errors_init(&surface, sizeof surface) == VG_STATUS_OK && isnan(surface.f_score));
+    DO(vg_metrics_pictures(&view->image, &view->image, &options, &pictures, &error));
+    CHECK(isinf(pictures.psnr_db) && pictures.ssim == 1 && isnan(pictures.lpips));
+    DO(vg_metrics_view(car, view, &options, &seen, &error));
+    CHECK(seen.psnr_db > 15 && seen.psnr_box_db > 10 && seen.ssim > 0.5 && seen.silhouette_iou > 0.9);
+    CHECK(isnan(seen.lpips) && seen.depth_mae_m < 0.1 && seen.depth_p90_m >= seen.depth_mae_m / 10);
+    DO(vg_metrics_surface(car, centres, count, &options, &surface, &error));
+    CHECK(surface.accuracy_m < 0.05 && surface.completeness_m < 0.1 && surface.precision > 0.9);
+    CHECK(near_to(surface.chamfer_m, 0.5 * (surface.accuracy_m + surface.completeness_m), 1e-9));
+    CHECK(surface.f_score > 0.5 && surface.length_error_percent < 10 && surface.width_error_percent < 10);
+    CHECK(surface.recall > 0.5 && surface.height_error_percent < 10);
+
+    options.f_score_m = 0;
+    FAILS(vg_metrics_surface(car, centres, count, &options, &surface, &error), VG_STATUS_ARGUMENT, "options.f_score_m: 0");
+    FAILS(vg_metrics_surface(car, NULL, 3, NULL, &surface, &error), VG_STATUS_ARGUMENT, "points: NULL");
+    FAILS(vg_metrics_view(car, view, NULL, NULL, &error), VG_STATUS_ARGUMENT, "out: NULL");
+    FAILS(vg_metrics_pictures(NULL, &view->image, NULL, &pictures, &error), VG_STATUS_ARGUMENT, "a: NULL");
+}
+
 int main(int argc, char **argv) {
     vg_context_options settings;
     vg_context *context = NULL;
@@ -606,6 +640,7 @@ int main(int argc, char **argv) {
     print_hash("sh", vg_gaussians_sh(car), n * 27 * sizeof(float));
     derive(car);
     render(car, &views[0].camera, context);
+    measure(car, &views[0], context);
     go_back(context);
 
     vg_scene_free(scene);

@@ -1393,6 +1393,139 @@ typedef struct vg_segment_options {
 } vg_segment_options;
 
 /**
+ * Settings of `vg_metrics_pictures`, `vg_metrics_view` and `vg_metrics_surface`.
+ */
+typedef struct vg_metrics_options {
+    /**
+     * `sizeof(vg_metrics_options)`.
+     */
+    size_t struct_size;
+    /**
+     * Threads and memory to use. NULL: made for this call, one thread per core.
+     */
+    struct vg_context *context;
+    /**
+     * A network that measures LPIPS, needed until the call returns. NULL: LPIPS is not measured.
+     */
+    const struct vg_model *lpips;
+    /**
+     * The distance below which a point of a surface counts as met, metres, 0.001 to 1000. Default 0.05.
+     */
+    double f_score_m;
+    /**
+     * Reserved: 0.
+     */
+    uint64_t flags;
+} vg_metrics_options;
+
+/**
+ * The difference of two pictures; NAN where a measure does not exist.
+ */
+typedef struct vg_picture_errors {
+    /**
+     * `sizeof(vg_picture_errors)`.
+     */
+    size_t struct_size;
+    /**
+     * Peak signal-to-noise ratio, dB; infinite for equal pictures.
+     */
+    double psnr_db;
+    /**
+     * Structural similarity, at most 1; NAN for a picture smaller than 11x11.
+     */
+    double ssim;
+    /**
+     * LPIPS; NAN without `options.lpips`, and for a picture smaller than 64x64.
+     */
+    double lpips;
+} vg_picture_errors;
+
+/**
+ * The error of a model in one photograph; NAN where a measure does not exist.
+ */
+typedef struct vg_view_errors {
+    /**
+     * `sizeof(vg_view_errors)`.
+     */
+    size_t struct_size;
+    /**
+     * Peak signal-to-noise ratio over the full frame, dB; infinite for equal pictures.
+     */
+    double psnr_db;
+    /**
+     * The same inside the bounding box of the mask; NAN where the mask is empty.
+     */
+    double psnr_box_db;
+    /**
+     * Structural similarity over the full frame, at most 1; NAN for a picture smaller than 11x11.
+     */
+    double ssim;
+    /**
+     * LPIPS over the full frame; NAN without `options.lpips`, and for a picture smaller than 64x64.
+     */
+    double lpips;
+    /**
+     * Intersection over union of the mask and the pixels that the model covers by half or more, 0 to 1.
+     */
+    double silhouette_iou;
+    /**
+     * Mean absolute difference of depth where the view has depth and the model covers the pixel by half or more,
+     * metres; NAN where that is nowhere.
+     */
+    double depth_mae_m;
+    /**
+     * 90th percentile of that difference, metres.
+     */
+    double depth_p90_m;
+} vg_view_errors;
+
+/**
+ * The error of a model's surface against a scan.
+ */
+typedef struct vg_surface_errors {
+    /**
+     * `sizeof(vg_surface_errors)`.
+     */
+    size_t struct_size;
+    /**
+     * Mean distance from the model's surface to the scan, metres; distances above 0.5 m count as 0.5 m.
+     */
+    double accuracy_m;
+    /**
+     * Mean distance from the scan to the model's surface, metres, likewise.
+     */
+    double completeness_m;
+    /**
+     * Mean of the two.
+     */
+    double chamfer_m;
+    /**
+     * Share of the model's surface that is nearer to the scan than `options.f_score_m`.
+     */
+    double precision;
+    /**
+     * Share of the scan that is nearer to the model's surface than `options.f_score_m`.
+     */
+    double recall;
+    /**
+     * Harmonic mean of the two.
+     */
+    double f_score;
+    /**
+     * How much longer (x) the model is than the scan, percent; negative: shorter.
+     */
+    double length_error_percent;
+    /**
+     * The same of the width (y).
+     */
+    double width_error_percent;
+    /**
+     * The same of the height (z).
+     */
+    double height_error_percent;
+} vg_surface_errors;
+
+/**
  * What of a scene is wanted, and what its files do not say.
  */
 typedef struct vg_scene_options {
@@ -2003,6 +2136,85 @@ vg_status vg_segment(const struct vg_model *model,
                      uint8_t *out_mask,
                      size_t row_stride,
                      struct vg_error **out_error);
+
+/**
+ * Sets `*options` to the default values. `size`: `sizeof *options`.
+ */
+VG_API
+vg_status vg_metrics_options_init(struct vg_metrics_options *options,
+                                  size_t size);
+
+/**
+ * Sets `*errors` to NAN throughout. `size`: `sizeof *errors`.
+ */
+VG_API
+vg_status vg_picture_errors_init(struct vg_picture_errors *errors,
+                                 size_t size);
+
+/**
+ * Sets `*errors` to NAN throughout. `size`: `sizeof *errors`.
+ */
+VG_API
+vg_status vg_view_errors_init(struct vg_view_errors *errors,
+                              size_t size);
+
+/**
+ * Sets `*errors` to NAN throughout. `size`: `sizeof *errors`.
+ */
+VG_API
+vg_status vg_surface_errors_init(struct vg_surface_errors *errors,
+                                 size_t size);
+
+/**
+ * Compares two pictures.
+ *
+ * - a, b: RGB8, BGR8, RGBA8, BGRA8, GRAY8 or RGBA32F, of one size; what their alpha leaves open is white. Not NULL.
+ * - options: NULL for the default values.
+ * - out: a struct that `vg_picture_errors_init` was called for; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_metrics_pictures(const struct vg_image *a,
+                              const struct vg_image *b,
+                              const struct vg_metrics_options *options,
+                              struct vg_picture_errors *out,
+                              struct vg_error **out_error);
+
+/**
+ * Draws a model on white as a view's camera sees it, and compares the picture with the view's photograph, which its
+ * mask puts on white: the full frame, so that what spills over the silhouette costs.
+ *
+ * - gaussians: not NULL.
+ * - view: of depth and mask what it has; not NULL.
+ * - options: NULL for the default values.
+ * - out: a struct that `vg_view_errors_init` was called for; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_metrics_view(const struct vg_gaussians *gaussians,
+                          const struct vg_view *view,
+                          const struct vg_metrics_options *options,
+                          struct vg_view_errors *out,
+                          struct vg_error **out_error);
+
+/**
+ * Compares a model's surface, which is what is seen of it from outside and above, with points measured on the
+ * vehicle. Points that stand alone are left out; how densely either side is sampled counts nothing.
+ *
+ * - gaussians: not NULL.
+ * - points: float32 `[point_count][3]` without gaps, metres, vehicle frame; not NULL.
+ * - point_count: 1 to 10 million.
+ * - options: NULL for the default values.
+ * - out: a struct that `vg_surface_errors_init` was called for; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_metrics_surface(const struct vg_gaussians *gaussians,
+                             const float *points,
+                             size_t point_count,
+                             const struct vg_metrics_options *options,
+                             struct vg_surface_errors *out,
+                             struct vg_error **out_error);
 
 /**
  * Sets `*options` to the default values. `size`: `sizeof *options`.

@@ -25,6 +25,7 @@ def main(arguments: list[str] | None = None) -> int:
     options.add_argument("--net", choices=["alex", "vgg", "squeeze"], default="alex", help="backbone (%(default)s)")
     options.add_argument("--backbone", type=Path, metavar="FILE.pth", help="torchvision's weights, already downloaded")
     options.add_argument("--random-weights", action="store_true", help="random backbone, to try the export")
+    options.add_argument("--seed", type=int, default=1, metavar="N", help="of the random backbone (1)")
     chosen = options.parse_args(arguments)
     if chosen.backbone is not None and not chosen.backbone.is_file():
         raise Unavailable(f"--backbone: {chosen.backbone}: no such file")
@@ -37,9 +38,11 @@ def main(arguments: list[str] | None = None) -> int:
     from . import contract, lpips_network
     from .graph import file_hash, report, tensor_hash, write
 
-    model = lpips_network.built(chosen.net)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(chosen.seed)
+        model = lpips_network.built(chosen.net)
     if chosen.random_weights:
-        weights = f"random backbone, {tensor_hash(model)}"
+        weights = f"random backbone, seed {chosen.seed}, {tensor_hash(model)}"
     else:
         file = chosen.backbone or lpips_network.backbone_file(chosen.net)
         lpips_network.load_backbone(model, chosen.net, file)

@@ -1,0 +1,52 @@
+"""How far a model is from photographs and from a scan."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _native
+from ._measures import PictureErrors, SurfaceErrors, ViewErrors
+
+if TYPE_CHECKING:
+    from ._native import Camera, Gaussians, Model
+
+
+def picture_errors(
+    a: npt.NDArray[Any], b: npt.NDArray[Any], *, lpips: Model | None = None, threads: int = 0
+) -> PictureErrors:
+    """The difference of two pictures of one size, uint8 or float32 in [0, 1], (height, width, 3 or 4).
+
+    What their alpha leaves open is white. lpips: the network that measures LPIPS, made by
+    ``python -m vehicle_gaussians.export.lpips``. threads: worker threads; 0 means one per core.
+    """
+    return PictureErrors(*_native.picture_errors(a, b, lpips, threads))
+
+
+def view_errors(
+    gaussians: Gaussians,
+    image: npt.NDArray[np.uint8],
+    mask: npt.NDArray[Any] | None,
+    camera: Camera,
+    depth: npt.NDArray[np.float32] | None = None,
+    *,
+    lpips: Model | None = None,
+    threads: int = 0,
+) -> ViewErrors:
+    """The error of a model, drawn on white, in one photograph, which its mask puts on white.
+
+    The picture, mask, camera and depth are as for ``reconstruct``; lpips and threads as for ``picture_errors``.
+    """
+    return ViewErrors(*_native.view_errors(gaussians, image, mask, camera, depth, lpips, threads))
+
+
+def surface_errors(
+    gaussians: Gaussians, points: npt.NDArray[np.float32], *, f_score: float = 0.05, threads: int = 0
+) -> SurfaceErrors:
+    """The error of a model's surface against points measured on the vehicle: float32 (n, 3), metres, its frame.
+
+    f_score: the distance below which a point counts as met, metres. threads: as for ``picture_errors``.
+    """
+    return SurfaceErrors(*_native.surface_errors(gaussians, points, f_score, threads))

@@ -1,0 +1,90 @@
+"""Measures: by either face the same numbers, None where there is none, and words for what cannot be measured."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import vehicle_gaussians as vg
+from conftest import Views
+from vehicle_gaussians import Status, capi
+
+FACES = [vg, capi]
+
+
+def ball(face: Any, ellipsoid: Views) -> Any:
+    views = [ellipsoid.images, ellipsoid.masks, ellipsoid.cameras, ellipsoid.depths]
+    return face.reconstruct(*views).gaussians
+
+
+def noisy(picture: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    noise = np.random.default_rng(1).integers(-20, 21, picture.shape)
+    return (picture + noise).clip(0, 255).astype(np.uint8)
+
+
+def test_both_faces_measure_the_same(ellipsoid: Views) -> None:
+    a, b = ellipsoid.images[0], noisy(ellipsoid.images[0])
+    assert vg.picture_errors(a, b) == capi.picture_errors(a, b)
+    view = (a, ellipsoid.masks[0], ellipsoid.cameras[0], ellipsoid.depths[0])
+    models = [ball(face, ellipsoid) for face in FACES]
+    seen = [face.view_errors(model, *view) for face, model in zip(FACES, models, strict=True)]
+    assert seen[0] == seen[1] and seen[0].silhouette_iou > 0.9 and seen[0].depth_mae_m < 0.1
+    scan = np.ascontiguousarray(models[0].means)
+    surface = [face.surface_errors(model, scan) for face, model in zip(FACES, models, strict=True)]
+    assert surface[0] == surface[1] and surface[0].accuracy_m < 0.1
+    assert surface[0].chamfer_m == (surface[0].accuracy_m + surface[0].completeness_m) / 2
+
+
+@pytest.mark.parametrize("face", FACES)
+def test_pictures_are_measured_as_the_formulas_say(face: Any, ellipsoid: Views) -> None:
+    a, b = ellipsoid.images[0], noisy(ellipsoid.images[0])
+    mse = np.mean((a / 255.0 - b / 255.0) ** 2)
+    errors = face.picture_errors(a, b)
+    assert errors.psnr_db == pytest.approx(-10 * math.log10(mse), abs=1e-5)
+    assert 0 < errors.ssim < 1 and errors.lpips is None
+    assert face.picture_errors(a, a) == (math.inf, 1.0, None)
+    assert face.picture_errors(a[:10], b[:10]).ssim is None
+    floats = [(p / 255.0).astype(np.float32) for p in (a, b)]
+    assert face.picture_errors(*floats) == pytest.approx(errors[:2] + (None,), abs=1e-6)
+    # Half of nothing and half of black, on white.
+    gray = np.full((*a.shape[:2], 3), 128, np.uint8)
+    black = np.zeros((*a.shape[:2], 4), np.uint8)
+    black[..., 3] = 127
+    assert face.picture_errors(gray, black).psnr_db > 80
+
+
+@pytest.mark.parametrize("face", FACES)
+def test_what_a_view_does_not_have_is_none(face: Any, ellipsoid: Views) -> None:
+    model = ball(face, ellipsoid)
+    errors = face.view_errors(model, ellipsoid.images[0], None, ellipsoid.cameras[0])
+    assert errors.depth_mae_m is None and errors.depth_p90_m is None and errors.lpips is None
+    empty = np.zeros_like(ellipsoid.masks[0])
+    assert face.view_errors(model, ellipsoid.images[0], empty, ellipsoid.cameras[0]).psnr_box_db is None
+
+
+@pytest.mark.parametrize("face", FACES)
+def test_what_cannot_be_measured_is_named(face: Any, ellipsoid: Views) -> None:
+    model, image = ball(face, ellipsoid), ellipsoid.images[0]
+    scan = np.zeros((5, 3), np.float32)
+    broken = scan.copy()
+    broken[2, 1] = np.nan
+    for call, words in [
+        (lambda: face.picture_errors(image, image[1:]), r"^b: 96x71; allowed: the size of a, 96x72"),
+        (lambda: face.picture_errors(image[..., :2], image), r"^a: shape \(72, 96, 2\)"),
+        (lambda: face.surface_errors(model, scan[:0]), r"^(scan|points|point_count): 0"),
+        (lambda: face.surface_errors(model, broken), r"^(scan|points)\[2\]: "),
+        (lambda: face.surface_errors(model, scan[:, :2]), r"^points: shape \(5, 2\); allowed: \(n, 3\)"),
+        (lambda: face.surface_errors(model, scan, f_score=0.0), r"^(options\.)?f_score(_m)?: 0"),
+        (lambda: face.view_errors(model, image[1:], None, ellipsoid.cameras[0]), r"^(view\.)?image: "),
+    ]:
+        with pytest.raises(vg.VgError, match=words) as caught:
+            call()
+        assert caught.value.code is Status.ARGUMENT
+    with pytest.raises(TypeError, match="points"):
+        face.surface_errors(model, scan.tolist() if face is capi else scan.astype(np.float64))
+    with pytest.raises(TypeError, match="lpips|model"):
+        face.picture_errors(image, image, lpips="m.onnx")
