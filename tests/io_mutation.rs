@@ -164,6 +164,9 @@ fn readers() -> Vec<Reader> {
         ("vehicle_from_world", read("sedan/vehicle_from_world.json"), SMALL, |b| {
             vehicle_frame::parse_vehicle_from_world(b, Path::new("file")).is_ok()
         }),
+        ("matrix", b"2 0 0 1 0 2 0 1 0 0 2 1 0 0 0 1".to_vec(), SMALL, |b| {
+            vehicle_frame::parse_matrix(b, Path::new("file")).is_ok()
+        }),
         ("known centres", br#"{"a.png": [1, 2, 3], "b.png": [4, 5, 6]}"#.to_vec(), SMALL, |b| {
             vehicle_frame::parse_known_centers(b, Path::new("file")).is_ok()
         }),

@@ -15,5 +15,6 @@ fuzz_target!(|bytes: &[u8]| {
         }
     }
     let _ = vehicle_frame::parse_vehicle_from_world(bytes, path);
+    let _ = vehicle_frame::parse_matrix(bytes, path);
     let _ = vehicle_frame::parse_known_centers(bytes, path);
 });

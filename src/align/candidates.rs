@@ -55,7 +55,7 @@ pub(super) fn find(outlines: &[Outline], scan: &Scan, ground: Option<DVec3>) -> 
 }
 
 /// Angle between two rotations.
-pub(super) fn turn_between(a: &Similarity, b: &Similarity) -> f64 {
+fn turn_between(a: &Similarity, b: &Similarity) -> f64 {
     let r = a.rotation.transpose() * b.rotation;
     (0.5 * (r.x_axis.x + r.y_axis.y + r.z_axis.z - 1.0)).clamp(-1.0, 1.0).acos()
 }

@@ -1,6 +1,6 @@
 //! To the frame of a scan: candidates by support functions, told apart and refined by outlines and sparse points.
 
-use super::candidates::{turn_between, turned};
+use super::candidates::turned;
 use super::heading::{Heading, asked_view, is_contrary, unknown};
 use super::scan::Scan;
 use super::silhouettes::Outline;
@@ -92,12 +92,18 @@ pub fn to_scan(views: &[View], sparse: &[DVec3], scan: &Cloud, heading: Heading)
     };
     let first: Vec<(Similarity, f64)> = starts.into_iter().take(TRIED).map(tried).collect();
     let best = best_of(first.iter().copied()).ok_or_else(|| nowhere("no start leads anywhere"))?;
-    // Whatever was found the other way round, and the best one exactly turned.
-    let is_opposite = |s: &Similarity| turn_between(s, &best) > std::f64::consts::FRAC_PI_2;
+    // Whatever was found upright the other way round, and the best one exactly turned.
+    let is_opposite = |s: &Similarity| {
+        let turn = s.rotation * best.rotation.transpose();
+        turn.x_axis.x < 0.0 && turn.z_axis.z > 0.0
+    };
     let exactly = turned(&best, scan.center);
     let opposite = first.iter().copied().chain([tried(exactly)]).filter(|f| is_opposite(&f.0));
     let other = best_of(opposite).unwrap_or(exactly);
-    let ((best, misses), (other, other_misses)) = (finished(best), finished(other));
+    let mut both = [finished(best), finished(other)];
+    // All points may judge otherwise than every fourth.
+    both.sort_by(|a, b| a.1.mean_px.total_cmp(&b.1.mean_px));
+    let [(best, misses), (other, other_misses)] = both;
     let worst = WORST_PX * f64::from(views[0].camera.width) / 512.0;
     if !(misses.mean_px <= worst && misses.median_m.is_finite()) {
         return Err(nowhere(&format!(
