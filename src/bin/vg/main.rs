@@ -13,6 +13,7 @@ mod files;
 mod info;
 mod job;
 mod pareto;
+mod raster;
 mod reconstruct;
 mod refine;
 mod render;
