@@ -1,9 +1,11 @@
 //! The command line: commands and their options.
 
 mod method;
+mod report;
 mod values;
 
 pub(crate) use method::MethodArgs;
+pub(crate) use report::ReportArgs;
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -36,6 +38,8 @@ pub(crate) enum Command {
     Eval(EvalArgs),
     /// Measure error against run time over a sweep of settings
     Pareto(ParetoArgs),
+    /// Reconstruct, and show on one HTML page what went in, what came out and how far off it is
+    Report(ReportArgs),
     /// Run the whole job on the sample inside this program
     Demo(DemoArgs),
     /// Find the similarity from a scene's world to the vehicle's frame, from known camera centres
