@@ -36,7 +36,11 @@ MARKS = {
     "Apache-2.0 WITH LLVM-exception": ["Apache License", "LLVM Exceptions to the Apache 2.0 License"],
     "Unicode-3.0": ["Unicode License V3", "and to permit persons to whom the data files or software"],
     "Unlicense": ["This is free and unencumbered software released into the public domain"],
+    "OFL-1.1": ["SIL Open Font License Version 1.1"],
 }
+
+# What a crate's manifest does not say: the licences of all that is in it, and the file with their text. As in deny.toml.
+CLARIFIED = {"notosans": ("(MIT OR Apache-2.0) AND OFL-1.1", "fonts/LICENSE_OFL.txt")}
 
 # Shortest and plainest first.
 PREFERRED = list(MARKS)
@@ -119,9 +123,10 @@ def alternatives(expression):
 
 def choose(package):
     """The licences under which a crate is used, the preferred one first."""
-    known = [s for s in alternatives(package["license"] or "") if s <= MARKS.keys()]
+    expression, _ = CLARIFIED.get(package["name"], (package["license"] or "", None))
+    known = [s for s in alternatives(expression) if s <= MARKS.keys()]
     if not known:
-        sys.exit(f"licenses.py: {package['name']}: no known licence in {package['license']!r}")
+        sys.exit(f"licenses.py: {package['name']}: no known licence in {expression!r}")
     ranks = [sorted(PREFERRED.index(licence) for licence in s) for s in known]
     return [PREFERRED[rank] for rank in min(ranks)]
 
@@ -145,6 +150,8 @@ def read_texts(package):
     files = sorted(f for f in folder.iterdir() if f.is_file() and names.match(f.name))
     if package["license_file"] and folder / package["license_file"] not in files:
         files.append(folder / package["license_file"])
+    if package["name"] in CLARIFIED:
+        files.append(folder / CLARIFIED[package["name"]][1])
     return {f.name: tidy(f.read_text(encoding="utf-8")) for f in files}
 
 

@@ -10,6 +10,7 @@ mod pareto;
 mod reconstruct;
 mod refine;
 mod render;
+mod report;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -110,12 +111,11 @@ fn json(path: &Path) -> serde_json::Value {
 fn help_documents_every_command_and_the_exit_codes() {
     let folder = Path::new(".");
     let help = succeed(folder, "--help").out;
-    for word in
-        ["reconstruct", "render", "info", "refine", "eval", "pareto", "demo", "align", "Exit codes: 0", "130"]
-    {
+    let commands = ["reconstruct", "render", "info", "refine", "eval", "pareto", "report", "demo", "align"];
+    for word in commands.into_iter().chain(["Exit codes: 0", "130"]) {
         assert!(help.contains(word), "{word} in {help}");
     }
-    for command in ["reconstruct", "render", "info", "refine", "eval", "pareto", "demo", "align"] {
+    for command in commands {
         assert!(succeed(folder, &format!("{command} --help")).out.contains("Usage: vg"));
     }
     assert_eq!(succeed(folder, "--version").out, concat!("vg ", env!("CARGO_PKG_VERSION"), "\n"));

@@ -3,7 +3,7 @@
 use super::*;
 use std::fs;
 
-const SWEEP: &str = "pareto . --repeat 2 --csv {}/p.csv --svg {}/p.svg --json {}/p.json";
+const SWEEP: &str = "pareto . --repeat 2 --csv {}/p.csv --svg {}/p.svg --png {}/p.png --json {}/p.json";
 
 fn sweep(folder: &Path, points: &[&str]) -> Run {
     let mut words: Vec<String> =
@@ -37,6 +37,8 @@ fn a_sweep_gives_a_table_a_plot_and_what_no_point_beats() {
     assert!(csv.starts_with("point,seconds,") && csv.contains("\"coarse, \"\"half\"\"\""), "{csv}");
     let svg = fs::read_to_string(folder.path().join("p.svg")).unwrap();
     assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n") && svg.matches("<circle").count() == 3);
+    let png = image::open(folder.path().join("p.png")).unwrap();
+    assert!(png.width() > 800 && png.height() > 400);
     assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
 }
 

@@ -64,6 +64,11 @@ fn notes() -> MutexGuard<'static, Vec<String>> {
     NOTES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// The notes so far, for a result that shows them; they remain to be told.
+pub(crate) fn noted() -> Vec<String> {
+    notes().clone()
+}
+
 /// The notes so far as warnings, a line each: for a job that went well.
 pub(crate) fn warn() {
     notes().drain(..).for_each(|note| line("warning", &note));

@@ -15,9 +15,11 @@ mod info;
 mod job;
 mod memory;
 mod pareto;
+mod raster;
 mod reconstruct;
 mod refine;
 mod render;
+mod report;
 mod sample;
 mod scene;
 mod shown;
@@ -39,6 +41,7 @@ fn main() -> ExitCode {
         Command::Info(args) => info::run(args),
         Command::Eval(args) => eval::run(args),
         Command::Pareto(args) => pareto::run(args),
+        Command::Report(args) => report::run(args),
         Command::Demo(args) => demo::run(args),
         Command::Align(args) => align::run(args),
     };

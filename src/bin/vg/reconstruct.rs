@@ -6,7 +6,7 @@ use crate::shown::Bar;
 use crate::{cloud, files, scene, shown};
 use vg::io::ply;
 use vg::onnx::Model;
-use vg::pipeline::{self, BudgetPlan, Options, Reconstruction};
+use vg::pipeline::{self, BudgetPlan, Options, Reconstruction, Report};
 use vg::progress::Threads;
 use vg::scene::Segmenter;
 use vg::{Scene, View, io};
@@ -38,14 +38,7 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
     opened.scene.cloud = args.method.cloud.as_deref().map(cloud::read).transpose()?;
     let settings = Options { points: args.points.is_some(), check: !args.no_check, ..args.method.options()? };
     let made = reconstruct(&opened.scene, &settings)?;
-    for warning in made.report.network.iter().flat_map(|network| &network.warnings) {
-        note(warning);
-    }
-    if let Some(plan) = made.report.plan.as_ref().filter(|plan| !plan.fits) {
-        let BudgetPlan { budget_s, predicted_s, .. } = plan;
-        note(&format!("the budget of {budget_s} s cannot be kept: the least takes about {predicted_s:.2} s"));
-    }
-
+    note_warnings(&made.report);
     ply::write(&args.output, &made.gaussians)?;
     if let (Some(path), Some(cloud)) = (&args.points, &made.points) {
         ply::write_points(path, &cloud.positions, &cloud.colors)?;
@@ -54,6 +47,17 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
         files::write_json(path, &made.report)?;
     }
     Ok(Outcome::done(format!("{}: {}{masks_by}", args.output.display(), summary(&made))))
+}
+
+/// What a user should hear of a reconstruction that went well.
+pub(crate) fn note_warnings(report: &Report) {
+    for warning in report.network.iter().flat_map(|network| &network.warnings) {
+        note(warning);
+    }
+    if let Some(plan) = report.plan.as_ref().filter(|plan| !plan.fits) {
+        let BudgetPlan { budget_s, predicted_s, .. } = plan;
+        note(&format!("the budget of {budget_s} s cannot be kept: the least takes about {predicted_s:.2} s"));
+    }
 }
 
 /// Masks of a network for the views that have none, and what to say of it. The network is opened only then.

@@ -77,7 +77,11 @@ pub(crate) fn picture_name(name: &str) -> String {
 }
 
 /// `n` cameras on a circle around the middle of the model, all of it in their pictures, the first in front.
-fn turntable(gaussians: &Gaussians, n: u32, (width, height): (u32, u32)) -> Result<Vec<NamedCamera>> {
+pub(crate) fn turntable(
+    gaussians: &Gaussians,
+    n: u32,
+    (width, height): (u32, u32),
+) -> Result<Vec<NamedCamera>> {
     let (low, high) =
         gaussians.bounds().ok_or_else(|| Failure::job("the model has no Gaussians to walk around"))?;
     let (low, high) = (low.map(f64::from), high.map(f64::from));

@@ -22,6 +22,13 @@ pub(crate) fn named(views: Option<&[String]>, options: &SceneOptions) -> SceneOp
     SceneOptions { views: views.map(<[String]>::to_vec), ..options.clone() }
 }
 
+/// What people call the scene: its folder's name.
+pub(crate) fn name(scene: &Path) -> String {
+    let absolute = std::fs::canonicalize(scene).unwrap_or_else(|_| scene.to_owned());
+    let folder = if absolute.is_file() { absolute.parent() } else { Some(absolute.as_path()) };
+    folder.and_then(Path::file_name).unwrap_or(scene.as_os_str()).to_string_lossy().into_owned()
+}
+
 /// The files a scene's views consist of, which no result may replace.
 pub(crate) fn files_of(index: &SceneIndex) -> Vec<PathBuf> {
     let views = index.views.iter().flat_map(|view| {

@@ -117,6 +117,9 @@ pub(crate) struct ParetoArgs {
     /// Write a plot of PSNR against seconds
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
+    /// The same as PNG
+    #[arg(long, value_name = "FILE")]
+    pub(crate) png: Option<PathBuf>,
     /// Heading of the plot
     #[arg(long, value_name = "TEXT", default_value = "Error against run time")]
     pub(crate) title: String,

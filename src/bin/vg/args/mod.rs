@@ -3,11 +3,13 @@
 mod align;
 mod eval;
 mod method;
+mod report;
 mod values;
 
 pub(crate) use align::{AlignArgs, Mode};
 pub(crate) use eval::{EvalArgs, JudgeArgs, ParetoArgs, TableName, VehiclesArgs};
 pub(crate) use method::MethodArgs;
+pub(crate) use report::ReportArgs;
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -40,6 +42,8 @@ pub(crate) enum Command {
     Eval(EvalArgs),
     /// Measure error against run time over a sweep of settings
     Pareto(ParetoArgs),
+    /// Reconstruct, and show on one HTML page what went in, what came out and how far off it is
+    Report(ReportArgs),
     /// Run the whole job on the sample inside this program
     Demo(DemoArgs),
     /// Find the similarity from a scene's world to the vehicle's frame: by a scan, camera centres, a box, or a matrix

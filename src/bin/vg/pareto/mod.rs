@@ -6,9 +6,9 @@ use crate::args::ParetoArgs;
 use crate::eval::contest::{self, Contest, Row};
 use crate::eval::system::System;
 use crate::eval::table;
-use crate::files;
 use crate::grid::{Column, Grid, number};
 use crate::job::{Outcome, Result};
+use crate::{files, raster};
 use serde::Serialize;
 use vg::onnx::ModelOptions;
 
@@ -32,7 +32,8 @@ struct Document<'a> {
 
 /// A scene or a point that cannot be measured is an error, and the others go on without it.
 pub(crate) fn run(args: &ParetoArgs) -> Result {
-    let outputs: Vec<_> = [&args.csv, &args.svg, &args.json].into_iter().flatten().cloned().collect();
+    let outputs: Vec<_> =
+        [&args.csv, &args.svg, &args.png, &args.json].into_iter().flatten().cloned().collect();
     files::refuse_clashes(&outputs, &[])?;
     outputs.iter().try_for_each(|path| files::prepare(path))?;
     let points = args.points.iter().map(|text| System::read("--point", text, &args.with));
@@ -48,8 +49,11 @@ pub(crate) fn run(args: &ParetoArgs) -> Result {
         files::write(path, grid.csv().as_bytes())?;
     }
     let drawn = plot::svg(&points, &args.title);
-    if let Some((path, drawn)) = args.svg.as_ref().zip(drawn) {
+    if let Some((path, drawn)) = args.svg.as_ref().zip(drawn.as_ref()) {
         files::write(path, drawn.as_bytes())?;
+    }
+    if let Some((path, drawn)) = args.png.as_ref().zip(drawn.as_ref()) {
+        files::write(path, &raster::png(drawn)?)?;
     }
     if let Some(path) = &args.json {
         let version = env!("CARGO_PKG_VERSION");

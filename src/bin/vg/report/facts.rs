@@ -1,0 +1,241 @@
+//! What the run's own report says, as rows for the page.
+
+use super::text::{decimals, number, psnr};
+use crate::shown;
+use vg::View;
+use vg::calibrate::{Calibration, Verdict};
+use vg::pipeline::{BudgetPlan, InputError, Report};
+use vg::prior::{BoxSource, NetworkFit, PhotoFit, PointFit};
+use vg::refine::{Densified, Refinement, Stop};
+use vg::relight::Relighting;
+use vg::symmetry::{Completion, SymmetryMode};
+
+/// A part of the report: names and values.
+pub(super) struct Part {
+    pub(super) heading: &'static str,
+    pub(super) rows: Vec<(&'static str, String)>,
+}
+
+/// The parts that this run has.
+pub(super) fn parts(report: &Report) -> Vec<Part> {
+    let part = |heading, rows: Option<Vec<_>>| Some(Part { heading, rows: rows? });
+    let ours = report.settings.baseline.is_none();
+    let vehicle_box = report.vehicle_box.map(|b| {
+        let source = match b.source {
+            BoxSource::Given => "the caller",
+            BoxSource::Estimated => "the silhouettes",
+        };
+        vec![
+            ("known from", source.into()),
+            ("length, width, height", lengths(b.size_m)),
+            ("lowest corner", lengths(b.low_m)),
+        ]
+    });
+    let masks = report.masks.map(|m| {
+        let both = [m.uncovered_before, m.uncovered_after].map(|share| 100.0 * share);
+        vec![("vehicle pixels that miss it", change(both, " %"))]
+    });
+    [
+        part("How the unseen side was completed", ours.then(|| symmetry(&report.symmetry))),
+        part("Its light", report.relight.as_ref().map(relight)),
+        part("Calibration of the cameras", report.calibration.as_ref().map(calibration)),
+        part("The box the vehicle was looked for in", vehicle_box),
+        part("The surface, by what the photographs agree on", report.photo.as_ref().map(photo)),
+        part("The surface, by the masks", masks),
+        part("The surface, by measured points", report.cloud.as_ref().map(points)),
+        part("Depth from a network", report.network.as_ref().map(network)),
+        part("Budget", report.plan.as_ref().map(budget)),
+        part("Refinement", report.refinement.as_ref().map(refinement)),
+        part("The method's own check in its inputs", report.input_error.as_ref().map(check)),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+type Rows = Vec<(&'static str, String)>;
+
+fn symmetry(done: &Completion) -> Rows {
+    let rule = match done.mode {
+        SymmetryMode::Auto => "what no view observed is mirrored",
+        SymmetryMode::Always => "all of the denser side is mirrored",
+        SymmetryMode::Never => "nothing is mirrored",
+        SymmetryMode::Flip => "the photographs are mirrored",
+    };
+    vec![
+        ("rule", rule.into()),
+        ("side with more Gaussians", format!("{:?}", done.reference_side).to_lowercase()),
+        ("mirror images", shown::count(done.cloned)),
+        ("observed ones given up for better", shown::count(done.replaced)),
+        ("not needed, observed too", shown::count(done.not_needed)),
+    ]
+}
+
+fn relight(light: &Relighting) -> Rows {
+    vec![
+        ("light from the left over that from the right", number(light.left_over_right.into())),
+        ("towards the sun: ahead, left, up", light.sun.map(|v| number(v.into())).join(", ")),
+        ("mirror images corrected", shown::count(light.clones)),
+    ]
+}
+
+fn calibration(found: &Calibration) -> Rows {
+    let verdict = match found.verdict {
+        Verdict::NotNeeded => "not needed",
+        Verdict::Accepted => "the cameras were moved",
+        Verdict::Refused => "refused, the cameras are as given",
+    };
+    let mut rows = vec![("verdict", verdict.into()), ("why", found.why.clone())];
+    if found.verdict != Verdict::NotNeeded {
+        rows.extend([
+            (
+                "plane of symmetry: yaw, roll",
+                format!("{}°, {}°", number(found.yaw_degrees), number(found.roll_degrees)),
+            ),
+            ("its offset", format!("{} m", number(found.lateral_m))),
+        ]);
+    }
+    rows.push((
+        "masks' pixels that meet the hull of the others",
+        change([found.coverage_before, found.coverage_after].map(|share| 100.0 * share), " %"),
+    ));
+    rows.push((
+        "edges of silhouettes miss it by",
+        change([found.edge_error_before_px, found.edge_error_after_px], " px"),
+    ));
+    if let (Some(before), Some(after)) = (found.held_out_before_px, found.held_out_after_px) {
+        rows.push(("those that took no part", change([before, after], " px")));
+    }
+    rows
+}
+
+fn photo(fit: &PhotoFit) -> Rows {
+    vec![
+        ("patches looked for in other views", shown::count(fit.patches)),
+        ("found", shown::count(fit.found)),
+        ("their distance to it", change([fit.before_m, fit.after_m].map(|m| 1e3 * m), " mm")),
+    ]
+}
+
+fn points(fit: &PointFit) -> Rows {
+    vec![
+        ("used", shown::count(fit.used)),
+        ("outside the silhouettes", shown::count(fit.outside)),
+        ("their distance to it", change([fit.before_m, fit.after_m].map(|m| 1e3 * m), " mm")),
+    ]
+}
+
+fn network(fit: &NetworkFit) -> Rows {
+    let mut rows = vec![
+        ("name", fit.prior.clone()),
+        ("pictures it was shown", format!("{} x {}", fit.size[0], fit.size[1])),
+        ("metres per unit", number(fit.scale)),
+        ("corrected by the cameras", if fit.rescaled { "yes" } else { "no" }.into()),
+        ("vehicle pixels without depth", shown::count(fit.without_depth)),
+    ];
+    if let Some(degrees) = fit.ray_degrees {
+        rows.push(("its rays lean by", format!("{}°", number(degrees))));
+    }
+    rows
+}
+
+fn budget(plan: &BudgetPlan) -> Rows {
+    let most = plan.chosen.max_views.map_or("all".into(), |n| n.to_string());
+    vec![
+        ("given", format!("{} s", number(plan.budget_s))),
+        ("predicted", format!("{} s{}", number(plan.predicted_s), if plan.fits { "" } else { ", too much" })),
+        ("depth from", plan.chosen.prior.name().into()),
+        ("share of width and height", number(plan.chosen.resolution)),
+        ("views at most", most),
+    ]
+}
+
+fn refinement(done: &Refinement) -> Rows {
+    let why = match done.stop {
+        Stop::Done => "all steps are done",
+        Stop::HeldOut => "the view that took no part got no better",
+        Stop::Diverged => "the error grew: the steps are too large",
+        Stop::Unseen => "no view sees the model",
+    };
+    let mut rows = vec![
+        ("steps planned", shown::count(done.iterations as usize)),
+        ("made", shown::count(done.made as usize)),
+        ("in the result", shown::count(done.kept as usize)),
+        ("ended because", why.into()),
+        ("PSNR of its views", change(done.psnr_db, " dB")),
+    ];
+    if let Some(Densified { cloned, split, pruned, .. }) = done.densified {
+        rows.push(("Gaussians cloned, split, gone", [cloned, split, pruned].map(shown::count).join(", ")));
+    }
+    if let Some(held_out) = &done.held_out {
+        rows.push(("view that took no part", held_out.view.clone()));
+        rows.push(("PSNR there", change(held_out.psnr_db, " dB")));
+    }
+    rows
+}
+
+fn check(error: &InputError) -> Rows {
+    vec![
+        ("PSNR", format!("{} dB", psnr(error.psnr_db))),
+        ("silhouette IoU", decimals(Some(error.silhouette_iou), 4)),
+        ("of each mask at least covered", format!("{} %", decimals(Some(100.0 * error.mask_covered), 1))),
+    ]
+}
+
+fn lengths(metres: [f64; 3]) -> String {
+    format!("{} m", metres.map(|m| format!("{m:.2}")).join(", "))
+}
+
+fn change(values: [f64; 2], unit: &str) -> String {
+    let [before, after] = values.map(number);
+    if before == after { format!("{before}{unit}") } else { format!("{before} → {after}{unit}") }
+}
+
+/// From photographs to Gaussians: what there was after each step.
+pub(super) struct Counted {
+    rows: Vec<(&'static str, usize)>,
+}
+
+impl Counted {
+    pub(super) fn of(views: &[View], report: &Report) -> Self {
+        let used = || views.iter().filter(|v| report.views_used.contains(&v.name));
+        let pixels = |v: &View| v.camera.width as usize * v.camera.height as usize;
+        let vehicle = |v: &View| v.mask.as_ref().map_or(pixels(v), vg::scene::Mask::vehicle_pixels);
+        let mut rows = vec![
+            ("photographs given", views.len()),
+            ("photographs used", report.views_used.len()),
+            ("pixels of those", used().map(pixels).sum()),
+            ("pixels in their masks", used().map(vehicle).sum()),
+        ];
+        let symmetry = &report.symmetry;
+        let divides = report.refinement.as_ref().is_some_and(|r| r.densified.is_some());
+        // Where Gaussians divided, nobody knows any more which were there first.
+        if report.settings.baseline.is_none() && !divides {
+            rows.extend([
+                (
+                    "Gaussians of pixels that were kept",
+                    report.gaussians + symmetry.replaced - symmetry.cloned,
+                ),
+                ("given up for better mirror images", symmetry.replaced),
+                ("mirror images", symmetry.cloned),
+            ]);
+        }
+        rows.push(("Gaussians of the model", report.gaussians));
+        Self { rows }
+    }
+
+    pub(super) fn rows(&self) -> &[(&'static str, usize)] {
+        &self.rows
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_is_told_once_where_there_is_none() {
+        assert_eq!(change([0.5, 0.25], " px"), "0.5 → 0.25 px");
+        assert_eq!(change([99.98, 99.98], " %"), "99.98 %");
+    }
+}

@@ -1,0 +1,135 @@
+//! `vg report`: one run on one page that needs nothing else: what went in, what came out, how far off it is, how long
+//! it took, and what was left out.
+
+mod chart;
+mod compare;
+mod facts;
+mod page;
+mod pictures;
+mod text;
+
+use crate::args::ReportArgs;
+use crate::eval::split;
+use crate::job::{self, Failure, Outcome, Result};
+use crate::{cloud, files, reconstruct, scene, shown};
+use compare::{Compared, Role};
+use std::path::{Path, PathBuf};
+use vg::io::SceneOptions;
+use vg::io::list_scene;
+use vg::progress::Threads;
+
+/// Opens, reconstructs, draws, writes.
+pub(crate) fn run(args: &ReportArgs) -> Result {
+    let chosen = Chosen::of(args)?;
+    let options = scene::options(&args.frame, args.depth.depth_scale, args.method.wants_depth())?;
+    let inputs = list_scene(&args.scene, &scene::named(chosen.inputs.as_deref(), &options))?;
+    // Depth of the test views is for the measure only.
+    let with_depth = SceneOptions { load_depth: true, ..options };
+    let tests = match chosen.tests.as_slice() {
+        [] => None,
+        names => Some(list_scene(&args.scene, &scene::named(Some(names), &with_depth))?),
+    };
+    let cloud_file = args.method.cloud.as_deref().map(|file| split::find(file, &args.scene));
+    let method = &args.method;
+    let more = [&cloud_file, &method.prior_model, &method.head_model, &chosen.file];
+    let frame = args.frame.vehicle_from_world.iter();
+    let read: Vec<PathBuf> = [Some(&inputs), tests.as_ref()]
+        .into_iter()
+        .flatten()
+        .flat_map(scene::files_of)
+        .chain(more.into_iter().flatten().chain(frame).cloned())
+        .collect();
+    files::refuse_clashes(std::slice::from_ref(&args.output), &read)?;
+    files::prepare(&args.output)?;
+
+    let mut opened = scene::load(inputs)?.scene;
+    opened.cloud = cloud_file.as_deref().map(cloud::read).transpose()?;
+    let made = reconstruct::reconstruct(&opened, &method.options()?)?;
+    reconstruct::note_warnings(&made.report);
+
+    let threads = Threads::new(method.threads)?;
+    let inputs = compare::views(&made.gaussians, &opened.views, Role::Input, &threads)?;
+    let counted = facts::Counted::of(&opened.views, &made.report);
+    drop(opened);
+    let tests = match tests {
+        Some(tests) => {
+            compare::views(&made.gaussians, &scene::load(tests)?.scene.views, Role::Test, &threads)?
+        }
+        None => Vec::new(),
+    };
+    let page = page::html(&page::Run {
+        vehicle: scene::name(&args.scene),
+        chosen: &chosen.how,
+        inputs: &inputs,
+        tests: &tests,
+        turntable: pictures::turntable(&made.gaussians, &threads)?,
+        report: &made.report,
+        counted,
+        warnings: &job::noted(),
+        command: text::command(std::env::args_os().skip(1)),
+    });
+    files::write(&args.output, page.as_bytes())?;
+    Ok(Outcome::done(summary(&args.output, page.len(), &inputs, &tests)))
+}
+
+/// Which views the method sees, and in which it is judged.
+struct Chosen {
+    /// All if not given.
+    inputs: Option<Vec<String>>,
+    tests: Vec<String>,
+    /// In words.
+    how: String,
+    /// The split's file.
+    file: Option<PathBuf>,
+}
+
+impl Chosen {
+    fn of(args: &ReportArgs) -> Result<Self> {
+        let alone = |inputs: Option<Vec<String>>, why: &str| {
+            let how = format!("{why}: the model is compared with the photographs it was made from alone.");
+            Ok(Self { inputs, tests: Vec::new(), how, file: None })
+        };
+        if let Some(names) = &args.views.views {
+            return alone(Some(names.clone()), "The views were chosen by --views");
+        }
+        let named = args.split.as_deref().unwrap_or(Path::new("split.json"));
+        let file = split::find(named, &args.scene);
+        match (&args.split, &args.only) {
+            (None, Some(only)) if !file.is_file() => {
+                let message =
+                    format!("--only {only}: no split.json here or in the scene's folder, and no --split");
+                return Err(Failure::job(message));
+            }
+            (None, None) if !file.is_file() => return alone(None, "There is no split"),
+            _ => {}
+        }
+        let splits = split::read(&file, args.only.as_deref())?;
+        let keys = splits.len();
+        let (key, split) = splits.into_iter().next().ok_or_else(|| Failure::job("the split is empty"))?;
+        let first = match keys {
+            1 => String::new(),
+            _ => format!(", the first of {keys} (--only chooses another)"),
+        };
+        let how = format!(
+            "Split {key} of {}{first}: {} views are the method's input, {} others are what it is judged by.",
+            file.display(),
+            split.input.len(),
+            split.test.len()
+        );
+        Ok(Self { inputs: Some(split.input), tests: split.test, how, file: Some(file) })
+    }
+}
+
+/// One line.
+fn summary(output: &Path, bytes: usize, inputs: &[Compared], tests: &[Compared]) -> String {
+    let (judged, what) = if tests.is_empty() { (inputs, "input") } else { (tests, "test") };
+    let errors = compare::mean(judged).map_or_else(String::new, |mean| {
+        format!(
+            "; in {} {what} views PSNR {} dB, silhouette IoU {:.3}",
+            judged.len(),
+            text::psnr(mean.psnr_db),
+            mean.silhouette_iou
+        )
+    });
+    format!("{}: {} kB{errors}", output.display(), shown::count(bytes.div_ceil(1000)))
+}

@@ -1,0 +1,341 @@
+//! The page itself: HTML with everything inside, and nothing that a browser would have to fetch.
+
+use super::chart;
+use super::compare::{self, Compared, Role};
+use super::facts::{self, Counted};
+use super::pictures::{self, Picture};
+use super::text::{decimals, escaped, ms, psnr};
+use crate::shown;
+use std::fmt::{self, Write};
+use vg::metrics::ViewErrors;
+use vg::pipeline::Report;
+
+/// What the page is about.
+pub(super) struct Run<'a> {
+    pub(super) vehicle: String,
+    /// Which views are inputs and which are judged, in words.
+    pub(super) chosen: &'a str,
+    pub(super) inputs: &'a [Compared],
+    /// None where all views are inputs.
+    pub(super) tests: &'a [Compared],
+    pub(super) turntable: Picture,
+    pub(super) report: &'a Report,
+    pub(super) counted: Counted,
+    pub(super) warnings: &'a [String],
+    /// That makes this page again.
+    pub(super) command: String,
+}
+
+/// The whole page.
+pub(super) fn html(run: &Run) -> String {
+    let mut out = String::new();
+    // Writing to a string does not fail.
+    let _ = write(&mut out, run);
+    out
+}
+
+fn write(out: &mut String, run: &Run) -> fmt::Result {
+    let vehicle = escaped(&run.vehicle);
+    // Browsers keep to the policy: a page that asked for anything would not get it.
+    write!(
+        out,
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; \
+         style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\n\
+         <link rel=\"icon\" href=\"data:,\">\n<title>{vehicle}: a vehicle in Gaussians</title>\n\
+         <style>\n{}</style>\n</head>\n<body>\n",
+        include_str!("style.css")
+    )?;
+    header(out, run, &vehicle)?;
+    out.push_str("<main>\n");
+    inputs(out, run.inputs)?;
+    if !run.tests.is_empty() {
+        tests(out, run.tests)?;
+    }
+    turntable(out, &run.turntable)?;
+    let report = run.report;
+    write!(
+        out,
+        "<section id=\"time\">\n<h2>Where the time went</h2>\n{}\n</section>\n",
+        chart::stages(&report.stages, report.total_ms)
+    )?;
+    counts(out, run)?;
+    details(out, report)?;
+    settings(out, run)?;
+    write!(out, "</main>\n<script>\n{}</script>\n</body>\n</html>\n", include_str!("script.js"))
+}
+
+/// Name and main figures.
+fn header(out: &mut String, run: &Run, vehicle: &str) -> fmt::Result {
+    let report = run.report;
+    write!(out, "<header>\n<h1>{vehicle}</h1>\n<p>{}</p>\n<dl class=\"headline\">\n", escaped(run.chosen))?;
+    let mut figure = |name: &str, value: &str| writeln!(out, "<div><dt>{name}</dt><dd>{value}</dd></div>");
+    let (judged, what) = match run.tests {
+        [] => (run.inputs, "input"),
+        tests => (tests, "unseen"),
+    };
+    if let Some(mean) = compare::mean(judged) {
+        let views = format!("{} {what} view{}", judged.len(), if judged.len() == 1 { "" } else { "s" });
+        figure(&format!("PSNR, {views}"), &format!("{} dB", psnr(mean.psnr_db)))?;
+        figure("SSIM there", &decimals(mean.ssim, 3))?;
+        figure("silhouette IoU there", &decimals(Some(mean.silhouette_iou), 3))?;
+    }
+    figure("reconstruction", &format!("{:.2} s", report.total_ms / 1e3))?;
+    let mut times: Vec<f64> = judged.iter().map(|one| one.render_ms).collect();
+    times.sort_by(f64::total_cmp);
+    if let Some(median) = times.get(times.len() / 2) {
+        figure("one picture of it", &ms(*median))?;
+    }
+    figure("Gaussians", &shown::count(report.gaussians))?;
+    if let Some(extent) = &report.extent_m {
+        figure("length, width, height", &shown::extent(extent))?;
+    }
+    out.push_str("</dl>\n");
+    if !run.warnings.is_empty() {
+        out.push_str("<ul class=\"warnings\">\n");
+        for warning in run.warnings {
+            writeln!(out, "<li>{}</li>", escaped(warning))?;
+        }
+        out.push_str("</ul>\n");
+    }
+    out.push_str("</header>\n");
+    Ok(())
+}
+
+fn inputs(out: &mut String, all: &[Compared]) -> fmt::Result {
+    write!(
+        out,
+        "<section id=\"inputs\">\n<h2>What went in</h2>\n\
+         <p>The photographs, masked and on white, each beside the model as its camera sees it.{}</p>\n\
+         <div class=\"pairs\">\n",
+        selection(all, Role::Input)
+    )?;
+    for (one, shown) in shown(all) {
+        let name = escaped(&one.name);
+        writeln!(
+            out,
+            "<figure class=\"view\">\n<figcaption>{}</figcaption>\n<div class=\"two\">",
+            caption(one)
+        )?;
+        image(out, &shown.photograph, "", &format!("Photograph {name} on white"))?;
+        image(out, &shown.render, "", &format!("The model as the camera of {name} sees it"))?;
+        out.push_str("</div>\n</figure>\n");
+    }
+    out.push_str("</div>\n");
+    numbers(out, all)?;
+    out.push_str("</section>\n");
+    Ok(())
+}
+
+fn tests(out: &mut String, all: &[Compared]) -> fmt::Result {
+    write!(
+        out,
+        "<section id=\"tests\">\n<h2>The unseen side</h2>\n\
+         <p>Views the method was not shown: the photograph on white, the model drawn on white, and their \
+         difference.{}</p>\n",
+        selection(all, Role::Test)
+    )?;
+    legend(out)?;
+    for (one, shown) in shown(all) {
+        let name = escaped(&one.name);
+        writeln!(
+            out,
+            "<figure class=\"view\">\n<figcaption>{}</figcaption>\n<div class=\"three\">",
+            caption(one)
+        )?;
+        image(out, &shown.photograph, "photograph", &format!("Photograph {name} on white"))?;
+        image(out, &shown.render, "model", &format!("The model as the camera of {name} sees it"))?;
+        if let Some(error) = &shown.error {
+            image(out, error, "difference", &format!("Difference of photograph and model in {name}"))?;
+        }
+        out.push_str("</div>\n</figure>\n");
+    }
+    numbers(out, all)?;
+    out.push_str("</section>\n");
+    Ok(())
+}
+
+/// What is said where not all views are shown.
+fn selection(all: &[Compared], role: Role) -> String {
+    let shown = shown(all).count();
+    match all.len() {
+        n if n > shown => {
+            format!(" {shown} of {n}, at most {} are shown; the numbers below are of all.", role.most())
+        }
+        _ => String::new(),
+    }
+}
+
+fn shown(all: &[Compared]) -> impl Iterator<Item = (&Compared, &compare::Shown)> {
+    all.iter().filter_map(|one| Some((one, one.shown.as_ref()?)))
+}
+
+/// The view's name and its main numbers.
+fn caption(one: &Compared) -> String {
+    let ViewErrors { psnr_db, ssim, silhouette_iou, .. } = one.errors;
+    format!(
+        "<b>{}</b> <span>PSNR {} dB</span> <span>SSIM {}</span> <span>IoU {silhouette_iou:.3}</span>",
+        escaped(&one.name),
+        psnr(psnr_db),
+        decimals(ssim, 3)
+    )
+}
+
+/// With its label below it, where it has one.
+fn image(out: &mut String, picture: &Picture, label: &str, alt: &str) -> fmt::Result {
+    let Picture { data, width, height } = picture;
+    write!(out, "<div><img src=\"{data}\" width=\"{width}\" height=\"{height}\" alt=\"{alt}\">")?;
+    if !label.is_empty() {
+        write!(out, "<small>{label}</small>")?;
+    }
+    out.push_str("</div>\n");
+    Ok(())
+}
+
+/// The scale of the differences.
+fn legend(out: &mut String) -> fmt::Result {
+    let colors = pictures::ERROR_COLORS.map(|[r, g, b]| format!("rgb({r},{g},{b})")).join(",");
+    writeln!(
+        out,
+        "<div class=\"legend\"><span>0</span><span class=\"scale\" role=\"img\" \
+         aria-label=\"Colours of the difference, from white to dark\" \
+         style=\"background:linear-gradient(90deg,{colors})\"></span><span>{:.0} % and more</span>\
+         <small>absolute difference, mean over red, green and blue, of the way from black to white; the same \
+         scale on every page</small></div>",
+        100.0 * pictures::ERROR_MOST
+    )
+}
+
+/// All numbers of all views. Columns that no view has are left out.
+fn numbers(out: &mut String, all: &[Compared]) -> fmt::Result {
+    type Column = (&'static str, fn(&ViewErrors) -> String, fn(&ViewErrors) -> bool);
+    let columns: [Column; 6] = [
+        ("PSNR, dB", |e| psnr(e.psnr_db), |_| true),
+        ("SSIM", |e| decimals(e.ssim, 4), |e| e.ssim.is_some()),
+        (
+            "PSNR in the mask's box, dB",
+            |e| e.psnr_box_db.map_or("–".into(), psnr),
+            |e| e.psnr_box_db.is_some(),
+        ),
+        ("silhouette IoU", |e| decimals(Some(e.silhouette_iou), 4), |_| true),
+        ("depth error, cm", |e| decimals(e.depth_mae_m.map(|m| 100.0 * m), 1), |e| e.depth_mae_m.is_some()),
+        (
+            "its worst tenth from, cm",
+            |e| decimals(e.depth_p90_m.map(|m| 100.0 * m), 1),
+            |e| e.depth_p90_m.is_some(),
+        ),
+    ];
+    let columns: Vec<&Column> =
+        columns.iter().filter(|(_, _, has)| all.iter().any(|one| has(&one.errors))).collect();
+    out.push_str("<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">view</th>");
+    for (name, ..) in &columns {
+        write!(out, "<th scope=\"col\">{name}</th>")?;
+    }
+    out.push_str("</tr></thead>\n<tbody>\n");
+    let mut row = |name: &str, errors: &ViewErrors| {
+        write!(out, "<tr><th scope=\"row\">{name}</th>")?;
+        for (_, text, _) in &columns {
+            write!(out, "<td>{}</td>", text(errors))?;
+        }
+        writeln!(out, "</tr>")
+    };
+    for one in all {
+        row(&escaped(&one.name), &one.errors)?;
+    }
+    if let Some(mean) = compare::mean(all).filter(|_| all.len() > 1) {
+        row("mean", &mean)?;
+    }
+    out.push_str("</tbody>\n</table></div>\n");
+    Ok(())
+}
+
+/// Its script finds it by class; without one the first picture stays.
+fn turntable(out: &mut String, strip: &Picture) -> fmt::Result {
+    let (n, height) = (pictures::FRAMES, strip.height / pictures::FRAMES);
+    write!(
+        out,
+        "<section id=\"around\">\n<h2>All around</h2>\n<div class=\"turntable\">\n\
+         <div class=\"window\" style=\"aspect-ratio:{}/{height}\"><img src=\"{}\" width=\"{}\" height=\"{}\" \
+         alt=\"The model from all around, {n} pictures\" draggable=\"false\"></div>\n\
+         <div class=\"controls\" hidden><button type=\"button\">Play</button>\
+         <input type=\"range\" min=\"0\" max=\"{}\" value=\"0\" aria-label=\"Direction of view\"></div>\n\
+         </div>\n</section>\n",
+        strip.width,
+        strip.data,
+        strip.width,
+        strip.height,
+        n - 1
+    )
+}
+
+/// What there was at each step, and what was left out.
+fn counts(out: &mut String, run: &Run) -> fmt::Result {
+    out.push_str("<section id=\"counts\">\n<h2>From pixels to Gaussians</h2>\n<div class=\"scroll\"><table>\n<tbody>\n");
+    for (name, count) in run.counted.rows() {
+        writeln!(out, "<tr><th scope=\"row\">{name}</th><td>{}</td></tr>", shown::count(*count))?;
+    }
+    out.push_str("</tbody>\n</table></div>\n<h3>What was left out</h3>\n");
+    if run.report.left_out.is_empty() {
+        out.push_str("<p>Nothing.</p>\n");
+    } else {
+        out.push_str(
+            "<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">what</th><th scope=\"col\">how many</th>\
+             <th scope=\"col\" class=\"words\">why</th></tr></thead>\n<tbody>\n",
+        );
+        for left in &run.report.left_out {
+            writeln!(
+                out,
+                "<tr><th scope=\"row\">{}</th><td>{}</td><td class=\"words\">{}</td></tr>",
+                escaped(&left.what),
+                shown::count(left.count),
+                escaped(&left.why)
+            )?;
+        }
+        out.push_str("</tbody>\n</table></div>\n");
+    }
+    out.push_str("</section>\n");
+    Ok(())
+}
+
+/// What the stages found.
+fn details(out: &mut String, report: &Report) -> fmt::Result {
+    out.push_str("<section id=\"facts\">\n<h2>What the stages found</h2>\n<div class=\"parts\">\n");
+    for part in facts::parts(report) {
+        writeln!(out, "<div class=\"part\">\n<h3>{}</h3>\n<dl>", part.heading)?;
+        for (name, value) in part.rows {
+            writeln!(out, "<div><dt>{name}</dt><dd>{}</dd></div>", escaped(&value))?;
+        }
+        out.push_str("</dl>\n</div>\n");
+    }
+    out.push_str("</div>\n</section>\n");
+    Ok(())
+}
+
+/// How to make the page again.
+fn settings(out: &mut String, run: &Run) -> fmt::Result {
+    let report = run.report;
+    let memory = report.peak_rss_bytes.map_or_else(String::new, |bytes| {
+        format!(", {} MB of memory at most", shown::count((bytes / 1_000_000) as usize))
+    });
+    let json = |value: &dyn Fn() -> serde_json::Result<String>| escaped(&value().unwrap_or_default());
+    write!(
+        out,
+        "<section id=\"settings\">\n<h2>How it was made</h2>\n\
+         <p>vg {}, depth from {}, {} threads{memory}. Pictures are JPEGs of at most {} pixels width; numbers are of \
+         the full size.</p>\n<pre><code>{}</code></pre>\n\
+         <p>Times and memory differ from run to run, and with them what was given seconds to spend. All the rest \
+         comes out the same.</p>\n\
+         <details><summary>Settings</summary><pre><code>{}</code></pre></details>\n\
+         <details><summary>The whole report, as of <code>vg reconstruct --report</code></summary>\
+         <pre><code>{}</code></pre></details>\n</section>\n",
+        report.version,
+        escaped(report.prior),
+        report.threads,
+        pictures::MOST_WIDE,
+        escaped(&run.command),
+        json(&|| serde_json::to_string_pretty(&report.settings)),
+        json(&|| serde_json::to_string_pretty(report)),
+    )
+}

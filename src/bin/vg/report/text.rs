@@ -1,0 +1,91 @@
+//! Text for the page: escaped names, numbers as people read them, and a command as a shell takes it.
+
+use std::ffi::OsString;
+
+/// For HTML, inside elements and inside quoted attributes. What a terminal would take for a command is shown as unknown.
+pub(super) fn escaped(text: &str) -> String {
+    let one = |c: char| match c {
+        '&' => "&amp;".into(),
+        '<' => "&lt;".into(),
+        '>' => "&gt;".into(),
+        '"' => "&quot;".into(),
+        '\'' => "&#39;".into(),
+        '\n' => "\n".into(),
+        c if c.is_control() => "\u{fffd}".into(),
+        c => c.to_string(),
+    };
+    text.chars().map(one).collect()
+}
+
+/// Without its unit; of pictures that are the same it is infinite.
+pub(super) fn psnr(db: f64) -> String {
+    if db.is_finite() { format!("{db:.2}") } else { "exact".into() }
+}
+
+/// With so many decimals; a dash where there is none.
+pub(super) fn decimals(value: Option<f64>, n: usize) -> String {
+    value.filter(|v| v.is_finite()).map_or_else(|| "–".into(), |v| format!("{v:.n$}"))
+}
+
+/// Milliseconds with three digits.
+pub(super) fn ms(ms: f64) -> String {
+    let n = match ms {
+        ms if ms < 9.995 => 2,
+        ms if ms < 99.95 => 1,
+        _ => 0,
+    };
+    format!("{ms:.n$} ms")
+}
+
+/// Four digits, more where they are before the point.
+pub(super) fn number(value: f64) -> String {
+    if !value.is_finite() {
+        return "–".into();
+    }
+    if value == 0.0 {
+        return "0".into();
+    }
+    let n = (3 - value.abs().log10().floor() as i32).clamp(0, 6) as usize;
+    let text = format!("{value:.n$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// `vg` with these arguments, quoted for a shell where that is needed.
+pub(super) fn command(arguments: impl Iterator<Item = OsString>) -> String {
+    let words = arguments.map(|word| quoted(&word.to_string_lossy()));
+    std::iter::once("vg".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+}
+
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./,:=+@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_cannot_break_the_page() {
+        let found = escaped("<script>\"a\" & 'b'\u{1b}");
+        assert_eq!(found, "&lt;script&gt;&quot;a&quot; &amp; &#39;b&#39;\u{fffd}");
+    }
+
+    #[test]
+    fn a_shell_takes_the_command_as_it_was_given() {
+        let words = ["report", "my car", "--box=4.6,1.9,1.5", "it's", ""].map(OsString::from);
+        assert_eq!(command(words.into_iter()), r"vg report 'my car' --box=4.6,1.9,1.5 'it'\''s' ''");
+    }
+
+    #[test]
+    fn numbers_have_four_digits_and_no_needless_zeros() {
+        let found = [0.0, 1.5, -0.012345, 123456.7, 3.0, 1e-9].map(number);
+        assert_eq!(found, ["0", "1.5", "-0.01235", "123457", "3", "0"]);
+        assert_eq!([ms(0.123), ms(12.34), ms(1234.5)], ["0.12 ms", "12.3 ms", "1234 ms"]);
+        assert_eq!([psnr(25.431), psnr(f64::INFINITY)], ["25.43", "exact"]);
+        assert_eq!([decimals(Some(0.98765), 3), decimals(None, 3)], ["0.988", "–"]);
+    }
+}
