@@ -20,8 +20,10 @@ struct Split {
     input: Vec<String>,
 }
 
-/// Columns, and where their numbers come from.
-const COLUMNS: [(&str, fn(&SurfaceErrors) -> f64); 9] = [
+/// A heading, and where its numbers come from.
+type Column = (&'static str, fn(&SurfaceErrors) -> f64);
+
+const COLUMNS: [Column; 9] = [
     ("accuracy m", |e| e.accuracy_m),
     ("completeness m", |e| e.completeness_m),
     ("Chamfer m", |e| e.chamfer_m),
