@@ -153,7 +153,7 @@ pub fn parse_known_centers(bytes: &[u8], path: &Path) -> Result<Vec<(String, DVe
 /// ([`Similarity::umeyama_robust`]). Cameras are known by name as in [`super::SceneOptions::views`]; at least three, not
 /// on one line.
 pub fn vehicle_from_known_centers(path: &Path, known: &[(String, DVec3)]) -> Result<Alignment> {
-    let listing = listing::list(path, None)?;
+    let listing = listing::list(path, super::colmap_format(path))?;
     let names: Vec<String> = known.iter().map(|(name, _)| name.clone()).collect();
     let chosen = select::select(&listing.views, &names)?;
     let centers: Vec<DVec3> = chosen.into_iter().map(|i| listing.views[i].camera.center()).collect();
