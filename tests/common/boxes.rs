@@ -107,7 +107,7 @@ fn on_surface(shape: &Shape, random: &mut Random) -> DVec3 {
             continue;
         }
         let mut point = low;
-        point[axis] = if random.bits() % 2 == 0 { low[axis] } else { high[axis] };
+        point[axis] = if random.bits().is_multiple_of(2) { low[axis] } else { high[axis] };
         point[u] += random.uniform(0.0, size[u]);
         point[v] += random.uniform(0.0, size[v]);
         let inside = |b: &[DVec3; 2]| point.cmpgt(b[0] + 1e-6).all() && point.cmplt(b[1] - 1e-6).all();
