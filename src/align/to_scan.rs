@@ -72,7 +72,7 @@ pub struct ScanAlignment {
 /// metres, with noise and strays. The result does not depend on the number of threads.
 ///
 /// # Errors
-/// Fewer than [`FEWEST_VIEWS`] masks, a scan without surface or not of a vehicle's size, an outline that nowhere
+/// Fewer than [`super::FEWEST_VIEWS`] masks, a scan without surface or not of a vehicle's size, an outline that nowhere
 /// fits the masks, and front and back that cannot be told apart under [`Heading::Auto`].
 pub fn to_scan(views: &[View], sparse: &[DVec3], scan: &Cloud, heading: Heading) -> Result<ScanAlignment> {
     let outlines = outlines(views)?;
