@@ -2,7 +2,7 @@
 
 use super::chart;
 use super::compare::{self, Compared, Role};
-use super::facts::{self, Counted};
+use super::facts;
 use super::pictures::{self, Picture};
 use super::text::{decimals, escaped, ms, psnr};
 use crate::shown;
@@ -20,7 +20,8 @@ pub(super) struct Run<'a> {
     pub(super) tests: &'a [Compared],
     pub(super) turntable: Picture,
     pub(super) report: &'a Report,
-    pub(super) counted: Counted,
+    /// From photographs to Gaussians.
+    pub(super) counts: &'a [(&'static str, usize)],
     pub(super) warnings: &'a [String],
     /// That makes this page again.
     pub(super) command: String,
@@ -273,7 +274,7 @@ fn turntable(out: &mut String, strip: &Picture) -> fmt::Result {
 /// What there was at each step, and what was left out.
 fn counts(out: &mut String, run: &Run) -> fmt::Result {
     out.push_str("<section id=\"counts\">\n<h2>From pixels to Gaussians</h2>\n<div class=\"scroll\"><table>\n<tbody>\n");
-    for (name, count) in run.counted.rows() {
+    for (name, count) in run.counts {
         writeln!(out, "<tr><th scope=\"row\">{name}</th><td>{}</td></tr>", shown::count(*count))?;
     }
     out.push_str("</tbody>\n</table></div>\n<h3>What was left out</h3>\n");
