@@ -56,7 +56,7 @@ fn the_page_needs_no_other_file_and_says_what_it_should() {
     // Input and render; photograph, render and error; the turntable.
     assert_eq!(page.matches("<img ").count(), 4 * 2 + 4 * 3 + 1);
     assert_eq!(page.matches("alt=\"\"").count(), 0);
-    let version = concat!("vg ", env!("CARGO_PKG_VERSION"), ", depth from shape");
+    let version = concat!("vg ", env!("CARGO_PKG_VERSION"), ", prior shape, head surfel");
     for said in
         ["Split right_to_left of", "4 unseen views", "176 973", "outside the mask", "prior <b>", version]
     {

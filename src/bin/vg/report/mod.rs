@@ -85,7 +85,7 @@ struct Chosen {
 impl Chosen {
     fn of(args: &ReportArgs) -> Result<Self> {
         let alone = |inputs: Option<Vec<String>>, why: &str| {
-            let how = format!("{why}: the model is compared with the photographs it was made from alone.");
+            let how = format!("{why}: the model is compared only with the photographs it was made from.");
             Ok(Self { inputs, tests: Vec::new(), how, file: None })
         };
         if let Some(names) = &args.views.views {

@@ -160,13 +160,11 @@ fn tests(out: &mut String, all: &[Compared]) -> fmt::Result {
 
 /// What is said where not all views are shown.
 fn selection(all: &[Compared], role: Role) -> String {
-    let shown = shown(all).count();
-    match all.len() {
-        n if n > shown => {
-            format!(" {shown} of {n}, at most {} are shown; the numbers below are of all.", role.most())
-        }
-        _ => String::new(),
+    let (n, most) = (all.len(), role.most());
+    if n <= most {
+        return String::new();
     }
+    format!(" Of {n} views, {most} spread evenly are shown; the numbers below are of all.")
 }
 
 fn shown(all: &[Compared]) -> impl Iterator<Item = (&Compared, &compare::Shown)> {
@@ -324,7 +322,7 @@ fn settings(out: &mut String, run: &Run) -> fmt::Result {
     write!(
         out,
         "<section id=\"settings\">\n<h2>How it was made</h2>\n\
-         <p>vg {}, depth from {}, {} threads{memory}. Pictures are JPEGs of at most {} pixels width; numbers are of \
+         <p>vg {}, prior {}, head {}, {} threads{memory}. Pictures are JPEGs of at most {} pixels width; numbers are of \
          the full size.</p>\n<pre><code>{}</code></pre>\n\
          <p>Times and memory differ from run to run, and with them what was given seconds to spend. All the rest \
          comes out the same.</p>\n\
@@ -333,6 +331,7 @@ fn settings(out: &mut String, run: &Run) -> fmt::Result {
          <pre><code>{}</code></pre></details>\n</section>\n",
         report.version,
         escaped(report.prior),
+        escaped(report.head),
         report.threads,
         pictures::MOST_WIDE,
         escaped(&run.command),
