@@ -8,17 +8,21 @@ use vg::pipeline::{BudgetPlan, InputError, Report};
 use vg::prior::{BoxSource, NetworkFit, PhotoFit, PointFit};
 use vg::refine::{Densified, Refinement, Stop};
 use vg::relight::Relighting;
+use vg::scene::Mask;
 use vg::symmetry::{Completion, SymmetryMode};
 
-/// A part of the report: names and values.
+/// Names and values.
+type Rows = Vec<(&'static str, String)>;
+
+/// A part of the report.
 pub(super) struct Part {
     pub(super) heading: &'static str,
-    pub(super) rows: Vec<(&'static str, String)>,
+    pub(super) rows: Rows,
 }
 
 /// The parts that this run has.
 pub(super) fn parts(report: &Report) -> Vec<Part> {
-    let part = |heading, rows: Option<Vec<_>>| Some(Part { heading, rows: rows? });
+    let part = |heading, rows: Option<Rows>| Some(Part { heading, rows: rows? });
     let ours = report.settings.baseline.is_none();
     let vehicle_box = report.vehicle_box.map(|b| {
         let source = match b.source {
@@ -33,7 +37,7 @@ pub(super) fn parts(report: &Report) -> Vec<Part> {
     });
     let masks = report.masks.map(|m| {
         let both = [m.uncovered_before, m.uncovered_after].map(|share| 100.0 * share);
-        vec![("vehicle pixels that miss it", change(both, " %"))]
+        vec![("vehicle pixels that miss it", change(both, "%"))]
     });
     [
         part("How the unseen side was completed", ours.then(|| symmetry(&report.symmetry))),
@@ -52,8 +56,6 @@ pub(super) fn parts(report: &Report) -> Vec<Part> {
     .flatten()
     .collect()
 }
-
-type Rows = Vec<(&'static str, String)>;
 
 fn symmetry(done: &Completion) -> Rows {
     let rule = match done.mode {
@@ -74,7 +76,7 @@ fn symmetry(done: &Completion) -> Rows {
 fn relight(light: &Relighting) -> Rows {
     vec![
         ("light from the left over that from the right", number(light.left_over_right.into())),
-        ("towards the sun: ahead, left, up", light.sun.map(|v| number(v.into())).join(", ")),
+        ("towards the sun: ahead, left, up", light.sun.map(|v| format!("{v:.2}")).join(", ")),
         ("mirror images corrected", shown::count(light.clones)),
     ]
 }
@@ -97,14 +99,14 @@ fn calibration(found: &Calibration) -> Rows {
     }
     rows.push((
         "masks' pixels that meet the hull of the others",
-        change([found.coverage_before, found.coverage_after].map(|share| 100.0 * share), " %"),
+        change([found.coverage_before, found.coverage_after].map(|share| 100.0 * share), "%"),
     ));
     rows.push((
         "edges of silhouettes miss it by",
-        change([found.edge_error_before_px, found.edge_error_after_px], " px"),
+        change([found.edge_error_before_px, found.edge_error_after_px], "px"),
     ));
     if let (Some(before), Some(after)) = (found.held_out_before_px, found.held_out_after_px) {
-        rows.push(("those that took no part", change([before, after], " px")));
+        rows.push(("those that took no part", change([before, after], "px")));
     }
     rows
 }
@@ -113,7 +115,7 @@ fn photo(fit: &PhotoFit) -> Rows {
     vec![
         ("patches looked for in other views", shown::count(fit.patches)),
         ("found", shown::count(fit.found)),
-        ("their distance to it", change([fit.before_m, fit.after_m].map(|m| 1e3 * m), " mm")),
+        ("their distance to it", change([fit.before_m, fit.after_m].map(|m| 1e3 * m), "mm")),
     ]
 }
 
@@ -121,7 +123,7 @@ fn points(fit: &PointFit) -> Rows {
     vec![
         ("used", shown::count(fit.used)),
         ("outside the silhouettes", shown::count(fit.outside)),
-        ("their distance to it", change([fit.before_m, fit.after_m].map(|m| 1e3 * m), " mm")),
+        ("their distance to it", change([fit.before_m, fit.after_m].map(|m| 1e3 * m), "mm")),
     ]
 }
 
@@ -162,14 +164,14 @@ fn refinement(done: &Refinement) -> Rows {
         ("made", shown::count(done.made as usize)),
         ("in the result", shown::count(done.kept as usize)),
         ("ended because", why.into()),
-        ("PSNR of its views", change(done.psnr_db, " dB")),
+        ("PSNR of its views", change(done.psnr_db, "dB")),
     ];
     if let Some(Densified { cloned, split, pruned, .. }) = done.densified {
         rows.push(("Gaussians cloned, split, gone", [cloned, split, pruned].map(shown::count).join(", ")));
     }
     if let Some(held_out) = &done.held_out {
         rows.push(("view that took no part", held_out.view.clone()));
-        rows.push(("PSNR there", change(held_out.psnr_db, " dB")));
+        rows.push(("PSNR there", change(held_out.psnr_db, "dB")));
     }
     rows
 }
@@ -188,45 +190,37 @@ fn lengths(metres: [f64; 3]) -> String {
 
 fn change(values: [f64; 2], unit: &str) -> String {
     let [before, after] = values.map(number);
-    if before == after { format!("{before}{unit}") } else { format!("{before} → {after}{unit}") }
+    // No line break before the unit.
+    match before == after {
+        true => format!("{before}\u{a0}{unit}"),
+        false => format!("{before} → {after}\u{a0}{unit}"),
+    }
 }
 
 /// From photographs to Gaussians: what there was after each step.
-pub(super) struct Counted {
-    rows: Vec<(&'static str, usize)>,
-}
-
-impl Counted {
-    pub(super) fn of(views: &[View], report: &Report) -> Self {
-        let used = || views.iter().filter(|v| report.views_used.contains(&v.name));
-        let pixels = |v: &View| v.camera.width as usize * v.camera.height as usize;
-        let vehicle = |v: &View| v.mask.as_ref().map_or(pixels(v), vg::scene::Mask::vehicle_pixels);
-        let mut rows = vec![
-            ("photographs given", views.len()),
-            ("photographs used", report.views_used.len()),
-            ("pixels of those", used().map(pixels).sum()),
-            ("pixels in their masks", used().map(vehicle).sum()),
-        ];
-        let symmetry = &report.symmetry;
-        let divides = report.refinement.as_ref().is_some_and(|r| r.densified.is_some());
-        // Where Gaussians divided, nobody knows any more which were there first.
-        if report.settings.baseline.is_none() && !divides {
-            rows.extend([
-                (
-                    "Gaussians of pixels that were kept",
-                    report.gaussians + symmetry.replaced - symmetry.cloned,
-                ),
-                ("given up for better mirror images", symmetry.replaced),
-                ("mirror images", symmetry.cloned),
-            ]);
-        }
-        rows.push(("Gaussians of the model", report.gaussians));
-        Self { rows }
+pub(super) fn counts(views: &[View], report: &Report) -> Vec<(&'static str, usize)> {
+    let used = || views.iter().filter(|v| report.views_used.contains(&v.name));
+    let pixels = |v: &View| v.camera.width as usize * v.camera.height as usize;
+    let vehicle = |v: &View| v.mask.as_ref().map_or(pixels(v), Mask::vehicle_pixels);
+    let mut rows = vec![
+        ("photographs given", views.len()),
+        ("photographs used", report.views_used.len()),
+        ("pixels of those", used().map(pixels).sum()),
+        ("pixels in their masks", used().map(vehicle).sum()),
+    ];
+    let symmetry = &report.symmetry;
+    let divides = report.refinement.as_ref().is_some_and(|r| r.densified.is_some());
+    // Where Gaussians divided, nobody knows any more which were there first.
+    if report.settings.baseline.is_none() && !divides {
+        let placed = report.gaussians + symmetry.replaced - symmetry.cloned;
+        rows.extend([
+            ("Gaussians of pixels that were kept", placed),
+            ("given up for better mirror images", symmetry.replaced),
+            ("mirror images", symmetry.cloned),
+        ]);
     }
-
-    pub(super) fn rows(&self) -> &[(&'static str, usize)] {
-        &self.rows
-    }
+    rows.push(("Gaussians of the model", report.gaussians));
+    rows
 }
 
 #[cfg(test)]
@@ -235,7 +229,7 @@ mod tests {
 
     #[test]
     fn a_change_is_told_once_where_there_is_none() {
-        assert_eq!(change([0.5, 0.25], " px"), "0.5 → 0.25 px");
-        assert_eq!(change([99.98, 99.98], " %"), "99.98 %");
+        assert_eq!(change([0.5, 0.25], "px"), "0.5 → 0.25\u{a0}px");
+        assert_eq!(change([99.98, 99.98], "%"), "99.98\u{a0}%");
     }
 }

@@ -14,8 +14,7 @@ use crate::job::{self, Failure, Outcome, Result};
 use crate::{cloud, files, reconstruct, scene, shown};
 use compare::{Compared, Role};
 use std::path::{Path, PathBuf};
-use vg::io::SceneOptions;
-use vg::io::list_scene;
+use vg::io::{SceneOptions, list_scene};
 use vg::progress::Threads;
 
 /// Opens, reconstructs, draws, writes.
@@ -49,7 +48,7 @@ pub(crate) fn run(args: &ReportArgs) -> Result {
 
     let threads = Threads::new(method.threads)?;
     let inputs = compare::views(&made.gaussians, &opened.views, Role::Input, &threads)?;
-    let counted = facts::Counted::of(&opened.views, &made.report);
+    let counts = facts::counts(&opened.views, &made.report);
     drop(opened);
     let tests = match tests {
         Some(tests) => {
@@ -64,7 +63,7 @@ pub(crate) fn run(args: &ReportArgs) -> Result {
         tests: &tests,
         turntable: pictures::turntable(&made.gaussians, &threads)?,
         report: &made.report,
-        counted,
+        counts: &counts,
         warnings: &job::noted(),
         command: text::command(std::env::args_os().skip(1)),
     });
@@ -86,7 +85,7 @@ struct Chosen {
 impl Chosen {
     fn of(args: &ReportArgs) -> Result<Self> {
         let alone = |inputs: Option<Vec<String>>, why: &str| {
-            let how = format!("{why}: the model is compared with the photographs it was made from alone.");
+            let how = format!("{why}: the model is compared only with the photographs it was made from.");
             Ok(Self { inputs, tests: Vec::new(), how, file: None })
         };
         if let Some(names) = &args.views.views {

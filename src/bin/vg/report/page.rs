@@ -2,7 +2,7 @@
 
 use super::chart;
 use super::compare::{self, Compared, Role};
-use super::facts::{self, Counted};
+use super::facts;
 use super::pictures::{self, Picture};
 use super::text::{decimals, escaped, ms, psnr};
 use crate::shown;
@@ -20,7 +20,8 @@ pub(super) struct Run<'a> {
     pub(super) tests: &'a [Compared],
     pub(super) turntable: Picture,
     pub(super) report: &'a Report,
-    pub(super) counted: Counted,
+    /// From photographs to Gaussians.
+    pub(super) counts: &'a [(&'static str, usize)],
     pub(super) warnings: &'a [String],
     /// That makes this page again.
     pub(super) command: String,
@@ -159,13 +160,11 @@ fn tests(out: &mut String, all: &[Compared]) -> fmt::Result {
 
 /// What is said where not all views are shown.
 fn selection(all: &[Compared], role: Role) -> String {
-    let shown = shown(all).count();
-    match all.len() {
-        n if n > shown => {
-            format!(" {shown} of {n}, at most {} are shown; the numbers below are of all.", role.most())
-        }
-        _ => String::new(),
+    let (n, most) = (all.len(), role.most());
+    if n <= most {
+        return String::new();
     }
+    format!(" Of {n} views, {most} spread evenly are shown; the numbers below are of all.")
 }
 
 fn shown(all: &[Compared]) -> impl Iterator<Item = (&Compared, &compare::Shown)> {
@@ -273,7 +272,7 @@ fn turntable(out: &mut String, strip: &Picture) -> fmt::Result {
 /// What there was at each step, and what was left out.
 fn counts(out: &mut String, run: &Run) -> fmt::Result {
     out.push_str("<section id=\"counts\">\n<h2>From pixels to Gaussians</h2>\n<div class=\"scroll\"><table>\n<tbody>\n");
-    for (name, count) in run.counted.rows() {
+    for (name, count) in run.counts {
         writeln!(out, "<tr><th scope=\"row\">{name}</th><td>{}</td></tr>", shown::count(*count))?;
     }
     out.push_str("</tbody>\n</table></div>\n<h3>What was left out</h3>\n");
@@ -323,7 +322,7 @@ fn settings(out: &mut String, run: &Run) -> fmt::Result {
     write!(
         out,
         "<section id=\"settings\">\n<h2>How it was made</h2>\n\
-         <p>vg {}, depth from {}, {} threads{memory}. Pictures are JPEGs of at most {} pixels width; numbers are of \
+         <p>vg {}, prior {}, head {}, {} threads{memory}. Pictures are JPEGs of at most {} pixels width; numbers are of \
          the full size.</p>\n<pre><code>{}</code></pre>\n\
          <p>Times and memory differ from run to run, and with them what was given seconds to spend. All the rest \
          comes out the same.</p>\n\
@@ -332,6 +331,7 @@ fn settings(out: &mut String, run: &Run) -> fmt::Result {
          <pre><code>{}</code></pre></details>\n</section>\n",
         report.version,
         escaped(report.prior),
+        escaped(report.head),
         report.threads,
         pictures::MOST_WIDE,
         escaped(&run.command),

@@ -27,14 +27,14 @@ pub(super) fn decimals(value: Option<f64>, n: usize) -> String {
     value.filter(|v| v.is_finite()).map_or_else(|| "–".into(), |v| format!("{v:.n$}"))
 }
 
-/// Milliseconds with three digits.
+/// Milliseconds with three digits, many of them as seconds.
 pub(super) fn ms(ms: f64) -> String {
-    let n = match ms {
-        ms if ms < 9.995 => 2,
-        ms if ms < 99.95 => 1,
-        _ => 0,
-    };
-    format!("{ms:.n$} ms")
+    match ms {
+        ms if ms < 9.995 => format!("{ms:.2} ms"),
+        ms if ms < 99.95 => format!("{ms:.1} ms"),
+        ms if ms < 9999.5 => format!("{ms:.0} ms"),
+        ms => format!("{:.1} s", ms / 1e3),
+    }
 }
 
 /// Four digits, more where they are before the point.
@@ -84,7 +84,10 @@ mod tests {
     fn numbers_have_four_digits_and_no_needless_zeros() {
         let found = [0.0, 1.5, -0.012345, 123456.7, 3.0, 1e-9].map(number);
         assert_eq!(found, ["0", "1.5", "-0.01235", "123457", "3", "0"]);
-        assert_eq!([ms(0.123), ms(12.34), ms(1234.5)], ["0.12 ms", "12.3 ms", "1234 ms"]);
+        assert_eq!(
+            [ms(0.123), ms(12.34), ms(1234.6), ms(21347.0)],
+            ["0.12 ms", "12.3 ms", "1235 ms", "21.3 s"]
+        );
         assert_eq!([psnr(25.431), psnr(f64::INFINITY)], ["25.43", "exact"]);
         assert_eq!([decimals(Some(0.98765), 3), decimals(None, 3)], ["0.988", "–"]);
     }
