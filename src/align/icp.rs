@@ -52,7 +52,7 @@ pub(super) fn system(
 fn distances(points: &[DVec3], scan: &Scan, s: &Similarity, reach: f64) -> Vec<Option<(DVec3, usize, f64)>> {
     let of = |p: &DVec3| {
         let point = s.transform_point(*p);
-        let (index, _) = scan.tree.nearest(point, reach)?;
+        let index = scan.tree.nearest(point).filter(|found| found.squared < reach * reach)?.index;
         Some((point, index, scan.normals[index].dot(point - scan.points[index])))
     };
     points.par_iter().map(of).collect()

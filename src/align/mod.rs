@@ -15,7 +15,6 @@ mod silhouettes;
 mod solve;
 mod to_box;
 mod to_scan;
-mod tree;
 
 pub use heading::Heading;
 pub use to_box::{BoxAlignment, to_box};

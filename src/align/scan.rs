@@ -1,14 +1,15 @@
 //! The scan, made ready: strays dropped, noise taken off, a normal for every point, and the points that can ever be
 //! outermost.
 
-use super::tree::Tree;
 use crate::error::{Error, Result};
+use crate::geometry::nearest::Nearest;
+use crate::geometry::robust::scramble;
 use crate::scene::Cloud;
 use glam::{DVec3, Vec3};
 use nalgebra::{Matrix3, SymmetricEigen};
 use rayon::prelude::*;
 
-/// More points than this say nothing new; a longer scan is thinned evenly.
+/// More points than this say nothing new; of a longer scan, so many are drawn.
 const MOST_POINTS: usize = 60_000;
 
 /// Fewer points than this are no shape.
@@ -39,7 +40,7 @@ pub(super) struct Scan {
     pub(super) points: Vec<DVec3>,
     /// Unit, of either sign.
     pub(super) normals: Vec<DVec3>,
-    pub(super) tree: Tree,
+    pub(super) tree: Nearest,
     /// Middle of the box.
     pub(super) center: DVec3,
     /// The corners of the convex hull, nearly: no other point is outermost in any picture.
@@ -48,9 +49,12 @@ pub(super) struct Scan {
 
 impl Scan {
     pub(super) fn new(cloud: &Cloud) -> Result<Self> {
-        let stride = cloud.points().len().div_ceil(MOST_POINTS);
+        // Scanners write in rows: shuffled, any part of the points shows all of the vehicle.
+        let mut order: Vec<usize> = (0..cloud.points().len()).collect();
+        order.sort_by_key(|&i| scramble(i as u64));
+        order.truncate(MOST_POINTS);
         let all: Vec<DVec3> =
-            cloud.points().iter().step_by(stride).map(|&p| Vec3::from_array(p).as_dvec3()).collect();
+            order.into_iter().map(|i| Vec3::from_array(cloud.points()[i]).as_dvec3()).collect();
         let dense = without_lonely(&all);
         let (points, normals) = smoothed(&dense);
         if points.len() < FEWEST_POINTS {
@@ -68,14 +72,14 @@ impl Scan {
             ));
         }
         let corners = corners(&points);
-        let tree = Tree::new(&points);
+        let tree = Nearest::new(points.iter().copied());
         Ok(Self { points, normals, tree, center: 0.5 * (low + high), corners })
     }
 }
 
 fn without_lonely(points: &[DVec3]) -> Vec<DVec3> {
-    let tree = Tree::new(points);
-    let reach = |p: &DVec3| tree.neighbours(*p, NEIGHBOURS / 2).last().map_or(0.0, |n| n.0.sqrt());
+    let tree = Nearest::new(points.iter().copied());
+    let reach = |p: &DVec3| tree.k_nearest(*p, NEIGHBOURS / 2).last().map_or(0.0, |n| n.squared.sqrt());
     let reaches: Vec<f64> = points.par_iter().map(reach).collect();
     let limit = ALONE * median(&reaches);
     points.iter().zip(&reaches).filter(|(_, r)| **r <= limit).map(|(p, _)| *p).collect()
@@ -84,10 +88,9 @@ fn without_lonely(points: &[DVec3]) -> Vec<DVec3> {
 /// Each point moved to the plane of its neighbours where they lie on one, with that plane's normal; without those far
 /// off it.
 fn smoothed(points: &[DVec3]) -> (Vec<DVec3>, Vec<DVec3>) {
-    let tree = Tree::new(points);
+    let tree = Nearest::new(points.iter().copied());
     let plane = |p: &DVec3| {
-        let around: Vec<DVec3> =
-            tree.neighbours(*p, NEIGHBOURS).iter().map(|n| points[n.1 as usize]).collect();
+        let around: Vec<DVec3> = tree.k_nearest(*p, NEIGHBOURS).iter().map(|n| points[n.index]).collect();
         let others = &around[1.min(around.len())..];
         let (middle, normal) = plane_of(others);
         let squares: f64 = others.iter().map(|q| normal.dot(*q - middle).powi(2)).sum();

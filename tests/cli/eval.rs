@@ -280,3 +280,31 @@ fn options_for_all_rows_have_their_place() {
     fail(folder, "eval . --with --prior=hull", 2, &["--with without --table"]);
     fail(folder, "eval . --table nothing", 2, &["main", "omissions"]);
 }
+
+#[test]
+fn a_colmap_model_is_aligned_on_the_way_and_two_possible_headings_are_an_error() {
+    let folder = copy_of_sample(&["images", "masks", "sparse", "split.json"]);
+    let at = folder.path();
+    let (model, _) = vg::io::ply::read(asset()).unwrap();
+    let scan: Vec<[f32; 3]> = model.means().iter().step_by(7).copied().collect();
+    let write = |name: &str, points: &[[f32; 3]]| {
+        vg::io::ply::write_points(&at.join(name), points, &vec![[128; 3]; points.len()]).unwrap();
+    };
+    write("scan.ply", &scan);
+    // Whatever the front looks like, so does the back.
+    let both: Vec<[f32; 3]> = scan.iter().flat_map(|&[x, y, z]| [[x, y, z], [-x, y, z]]).collect();
+    write("both.ply", &both);
+
+    succeed(at, "eval {} --align scan.ply --scan scan.ply --prior hull --json {}/e.json");
+    succeed(at, "eval . --prior hull --json {}/t.json");
+    let (found, truth) = (json(&at.join("e.json")), json(&at.join("t.json")));
+    let psnr = |document: &serde_json::Value| document["mean"]["psnr_db"].as_f64().unwrap();
+    assert!((psnr(&found) - psnr(&truth)).abs() < 1.0, "{} {}", psnr(&found), psnr(&truth));
+    assert!(found["aligned"][0]["residual_m"].as_f64().unwrap() < 0.05, "{}", found["aligned"]);
+    assert!(found["mean"]["surface"]["chamfer_m"].as_f64().unwrap() < 0.1, "{}", found["mean"]);
+    assert_eq!(truth["aligned"].as_array().unwrap().len(), 0);
+
+    fail(at, "eval {} --align both.ply", 1, &["--heading", "cannot be told apart"]);
+    fail(at, "eval {} --align", 1, &["--scan", "holds no scan"]);
+    fail(at, "eval {} --prior hull", 1, &["vehicle"]);
+}

@@ -1,9 +1,9 @@
 //! The vehicles of a measurement: their folders, splits, and whose frame their poses are in.
 
 use super::split::{self, Split};
-use crate::align;
 use crate::args::VehiclesArgs;
 use crate::job::{Failure, Result};
+use crate::{align, scene as scenes};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use vg::align::Heading;
@@ -40,7 +40,7 @@ impl Vehicle {
     pub(crate) fn open(scene: &Path, args: &VehiclesArgs) -> Result<Self> {
         let splits = split::read(&split::find(&args.split, scene), args.only.as_deref())?;
         let mut vehicle = Self {
-            name: name_of(scene),
+            name: scenes::name(scene),
             scene: scene.to_owned(),
             splits,
             vehicle_from_world: None,
@@ -112,12 +112,4 @@ fn scenes_in(folder: &Path) -> Result<Option<Vec<PathBuf>>> {
     }
     scenes.sort();
     Ok((!scenes.is_empty()).then_some(scenes))
-}
-
-/// The folder's name, of a file the name of its folder.
-fn name_of(scene: &Path) -> String {
-    let absolute = std::fs::canonicalize(scene).unwrap_or_else(|_| scene.to_owned());
-    let folder = if absolute.is_file() { absolute.parent() } else { Some(absolute.as_path()) };
-    let name = folder.and_then(Path::file_name).unwrap_or(scene.as_os_str());
-    name.to_string_lossy().into_owned()
 }
