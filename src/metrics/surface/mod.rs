@@ -80,9 +80,9 @@ pub struct SurfaceErrors {
     pub height_error_percent: f64,
 }
 
-/// The share of points that may lie beyond either end of a side: a scan's strays so near to the vehicle that they were not
-/// known for strays, a model's floaters. A mirror is twice as many points.
-const BEYOND: f64 = 0.002;
+/// The share of points that may lie beyond either end of a side: strays so near to the vehicle that they were not
+/// known for strays. More would cut off mirrors.
+const BEYOND: f64 = 0.0005;
 
 impl SurfaceErrors {
     /// Of a model against points measured on the vehicle, vehicle frame, metres.
@@ -118,7 +118,7 @@ impl SurfaceErrors {
         let (accuracy_m, completeness_m) = (mean(&there), mean(&back));
         let (precision, recall) = (share(&there, options.f_score_m), share(&back, options.f_score_m));
         let both = precision + recall;
-        let of_model = extents(&model);
+        let of_model = extents(&strays::removed(&model));
         let of_scan = extents(&scan);
         let [length, width, height] = std::array::from_fn(|k| {
             if of_scan[k] > 0.0 { 100.0 * (of_model[k] / of_scan[k] - 1.0) } else { 0.0 }
