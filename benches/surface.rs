@@ -20,8 +20,10 @@ struct Split {
     input: Vec<String>,
 }
 
+type Measure = fn(&SurfaceErrors) -> f64;
+
 /// Columns, and where their numbers come from.
-const COLUMNS: [(&str, fn(&SurfaceErrors) -> f64); 9] = [
+const COLUMNS: [(&str, Measure); 9] = [
     ("accuracy m", |e| e.accuracy_m),
     ("completeness m", |e| e.completeness_m),
     ("Chamfer m", |e| e.chamfer_m),
