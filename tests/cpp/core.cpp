@@ -2,6 +2,7 @@
 //
 //     core SCRATCH_FOLDER
 #include <array>
+#include <cmath>
 #include <csignal>
 #include <cstring>
 #include <limits>
