@@ -1280,7 +1280,7 @@ def view_errors(
     if depth is not None:
         view.depth = _plane(depth, "depth", np.float32, Format.DEPTH32F, alive)
     options, errors = _metrics_options(lpips, 0.05, context), _initial(vg_view_errors)
-    _call("vg_metrics_view", gaussians, ct.byref(view), ct.byref(options), ct.byref(errors))
+    _call("vg_metrics_view", gaussians._handle, ct.byref(view), ct.byref(options), ct.byref(errors))
     return ViewErrors(*_measures(errors))  # type: ignore[arg-type]
 
 
@@ -1297,7 +1297,7 @@ def surface_errors(
     points = np.require(points, requirements=["C", "A"])
     options, errors = _metrics_options(None, f_score, context), _initial(vg_surface_errors)
     _call(
-        "vg_metrics_surface", gaussians, points.ctypes.data, len(points), ct.byref(options), ct.byref(errors)
+        "vg_metrics_surface", gaussians._handle, points.ctypes.data, len(points), ct.byref(options), ct.byref(errors)
     )
     return SurfaceErrors(*_measures(errors))  # type: ignore[arg-type]
 
