@@ -975,6 +975,87 @@ inline Result<vg_surface_errors> surface_errors(const Gaussians &gaussians,
     return errors;
 }
 
+// ---- Alignment
+
+/// Points of a structure-from-motion model's world, in its units.
+using WorldPoints = std::vector<std::array<double, 3>>;
+
+/// Settings of an alignment.
+struct AlignOptions : vg_align_options {
+    explicit AlignOptions(vg_heading front = VG_HEADING_AUTO) noexcept : vg_align_options{} {
+        vg_align_options_init(this, sizeof(vg_align_options));
+        heading = front;
+    }
+};
+
+namespace detail {
+
+template <class Call> inline Result<vg_alignment> aligned(const Call &call) {
+    vg_alignment found;
+    vg_alignment_init(&found, sizeof found);
+    const Result<void> gone = done([&](vg_error **error) { return call(&found, error); });
+    if (!gone) {
+        return gone.error();
+    }
+    return found;
+}
+
+inline const double *first_of(const WorldPoints &points) noexcept {
+    return points.empty() ? nullptr : points.front().data();
+}
+
+} // namespace detail
+
+/// The vehicle's frame by points scanned on the vehicle, metres, in that frame: their outline must run along the edges
+/// of all masks. The views' poses are in the world; their photographs may be missing.
+inline Result<vg_alignment> align_scan(const std::vector<vg_view> &views, const WorldPoints &sparse,
+                                       const std::vector<std::array<float, 3>> &scan,
+                                       const AlignOptions &options = AlignOptions()) {
+    const float *first = scan.empty() ? nullptr : scan.front().data();
+    return detail::aligned([&](vg_alignment *out, vg_error **error) {
+        return vg_align_scan(views.data(), views.size(), detail::first_of(sparse), sparse.size(), first,
+                             scan.size(), &options, out, error);
+    });
+}
+
+/// The vehicle's frame by its length, width and height, metres, and the ground among the sparse points.
+inline Result<vg_alignment> align_box(const std::vector<vg_view> &views, const WorldPoints &sparse,
+                                      const std::array<double, 3> &size, const AlignOptions &options) {
+    return detail::aligned([&](vg_alignment *out, vg_error **error) {
+        return vg_align_box(views.data(), views.size(), detail::first_of(sparse), sparse.size(), size.data(),
+                            &options, out, error);
+    });
+}
+
+/// The similarity that takes points of the world, the cameras' centres for one, to where they were measured in the
+/// vehicle's frame, metres; those that contradict the others are left out, which `kept` tells, one element a point.
+inline Result<vg_alignment> align_points(const WorldPoints &world, const WorldPoints &vehicle,
+                                         std::vector<std::uint8_t> *kept = nullptr) {
+    if (world.size() != vehicle.size()) {
+        return Error{VG_STATUS_ARGUMENT, "vehicle: " + std::to_string(vehicle.size()) + ", allowed: as many as world, " +
+                                             std::to_string(world.size())};
+    }
+    std::vector<std::uint8_t> used(world.size());
+    const auto found = detail::aligned([&](vg_alignment *out, vg_error **error) {
+        return vg_align_points(detail::first_of(world), detail::first_of(vehicle), world.size(), out,
+                               used.data(), nullptr, error);
+    });
+    if (found && kept != nullptr) {
+        *kept = std::move(used);
+    }
+    return found;
+}
+
+/// `align_scan` with the files of a scene: a COLMAP folder, one of 3DRealCar, or a `transforms.json`. `scan`: a PLY file;
+/// empty: the scan in a folder of 3DRealCar.
+inline Result<vg_alignment> align_folder(const std::string &path, const std::string &scan = {},
+                                         const AlignOptions &options = AlignOptions()) {
+    const char *file = scan.empty() ? nullptr : scan.c_str();
+    return detail::aligned([&](vg_alignment *out, vg_error **error) {
+        return vg_align_folder(path.c_str(), file, &options, out, error);
+    });
+}
+
 // ---- OpenCV
 
 #ifdef VG_HAS_OPENCV

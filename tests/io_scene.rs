@@ -59,7 +59,7 @@ fn the_gauge_is_found_from_camera_centres() {
     let found = vehicle_from_known_centers(&sedan().join("sparse/0"), &known).unwrap();
     assert!(found.residuals.iter().all(|r| *r < 1e-9), "{:?}", found.residuals);
     let expected = sedan_colmap().vehicle_from_world.unwrap();
-    assert!((found.vehicle_from_world.scale / expected.scale - 1.0).abs() < 1e-9);
+    assert!((found.similarity.scale / expected.scale - 1.0).abs() < 1e-9);
 }
 
 #[test]
@@ -245,8 +245,7 @@ fn the_shared_scenes_open_by_both_descriptions() {
         let found = vehicle_from_known_centers(&model, &known).unwrap();
         let rms = (found.residuals.iter().map(|r| r * r).sum::<f64>() / known.len() as f64).sqrt();
         assert!(rms < 0.1, "{}: {rms} m", instance.display());
-        let options =
-            SceneOptions { vehicle_from_world: Some(found.vehicle_from_world), ..SceneOptions::default() };
+        let options = SceneOptions { vehicle_from_world: Some(found.similarity), ..SceneOptions::default() };
         let opened = open_scene(&model, &options).unwrap();
         assert_eq!(opened.scene.views.len(), known.len());
         let points = opened.index.sparse_points().unwrap().unwrap().0.len();

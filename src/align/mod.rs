@@ -5,6 +5,7 @@
 //! vehicle's size and the ground. Measured in docs/ALIGN.md.
 
 mod candidates;
+mod folder;
 mod footprint;
 mod ground;
 mod heading;
@@ -16,6 +17,7 @@ mod solve;
 mod to_box;
 mod to_scan;
 
+pub use folder::{folder_to_scan, masks_of, scan_of};
 pub use heading::Heading;
 pub use to_box::{BoxAlignment, to_box};
 pub use to_scan::{LEAST_CONFIDENCE, ScanAlignment, to_scan};
@@ -23,11 +25,20 @@ pub use to_scan::{LEAST_CONFIDENCE, ScanAlignment, to_scan};
 use crate::error::{Error, Result};
 use crate::scene::View;
 use crate::scene::undistort::undistorted;
+use glam::DVec3;
 use rayon::prelude::*;
 use silhouettes::Outline;
 
 /// Fewer masks leave scale or place open.
 pub const FEWEST_VIEWS: usize = 3;
+
+/// Points as the caller counts them, all finite.
+fn check_sparse(sparse: &[DVec3]) -> Result<()> {
+    match sparse.iter().position(|p| !p.is_finite()) {
+        Some(i) => Err(Error::argument(format!("sparse[{i}]"), sparse[i].to_string(), "finite")),
+        None => Ok(()),
+    }
+}
 
 /// Fewer pieces of edge in all masks together are no outline.
 const FEWEST_EDGES: usize = 60;

@@ -3,7 +3,7 @@
 
 use super::footprint::Footprint;
 use super::heading::{Heading, asked_view, is_contrary, unknown};
-use super::{candidates, ground, hull, nowhere, outlines};
+use super::{candidates, check_sparse, ground, hull, nowhere, outlines};
 use crate::error::{Error, Result};
 use crate::geometry::Similarity;
 use crate::scene::View;
@@ -52,6 +52,7 @@ pub fn to_box(views: &[View], sparse: &[DVec3], size: [f64; 3], heading: Heading
         let allowed = format!("length, width and height of {} to {} m", SIDES_M.start(), SIDES_M.end());
         return Err(Error::argument("size", format!("{size:?}"), allowed));
     }
+    check_sparse(sparse)?;
     let outlines = outlines(views)?;
     let Some((on_ground, up)) = ground::plane(sparse, &outlines) else {
         let found = format!("{} points that show no ground", sparse.len());

@@ -4,7 +4,7 @@ use super::candidates::turned;
 use super::heading::{Heading, asked_view, is_contrary, unknown};
 use super::scan::Scan;
 use super::silhouettes::Outline;
-use super::{candidates, ground, icp, nowhere, outlines, silhouettes, solve};
+use super::{candidates, check_sparse, ground, icp, nowhere, outlines, silhouettes, solve};
 use crate::error::Result;
 use crate::geometry::Similarity;
 use crate::scene::{Cloud, View};
@@ -75,6 +75,7 @@ pub struct ScanAlignment {
 /// Fewer than [`super::FEWEST_VIEWS`] masks, a scan without surface or not of a vehicle's size, an outline that nowhere
 /// fits the masks, and front and back that cannot be told apart under [`Heading::Auto`].
 pub fn to_scan(views: &[View], sparse: &[DVec3], scan: &Cloud, heading: Heading) -> Result<ScanAlignment> {
+    check_sparse(sparse)?;
     let outlines = outlines(views)?;
     let scan = Scan::new(scan)?;
     let up = ground::plane(sparse, &outlines).map(|ground| ground.1);

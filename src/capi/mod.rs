@@ -49,9 +49,12 @@ mod metrics;
 
 mod scene;
 
+mod align;
+
 #[cfg(test)]
 mod tests;
 
+pub use align::*;
 pub use camera::*;
 pub use context::*;
 pub use gaussians::*;

@@ -38,6 +38,10 @@ fn layout_of_rust() -> String {
         )* };
     }
     lay_out! {
+        vg_align_options { struct_size context heading flags }
+        vg_alignment {
+            struct_size vehicle_from_world scale residual_m confidence residual_px other_px used_count
+        }
         vg_camera { struct_size width height model flags params vehicle_from_camera reserved }
         vg_context_options { struct_size threads flags }
         vg_gaussian_arrays { struct_size count positions scales rotations opacities sh sh_degree flags }
@@ -117,6 +121,7 @@ fn numbers_of_rust() -> BTreeSet<String> {
         vg_camera_model { SimplePinhole Pinhole SimpleRadial Radial Opencv OpencvFisheye FullOpencv }
         vg_depth_mode { Expected Accumulated }
         vg_format { Rgb8 Bgr8 Rgba8 Bgra8 Gray8 Rgba32f Depth32f }
+        vg_heading { Auto Forward Backward }
         vg_keep { DuplicateViews Overlap SilhouetteEdge Floaters ShBands }
         vg_log_level { Warning Info Debug }
         vg_prepack { Auto Always Never }
@@ -170,6 +175,10 @@ fn vg_abi_witness_metrics(
     _: &vg_surface_errors,
 ) {
 }
+
+/// Those of the alignment.
+#[safer_ffi::ffi_export]
+fn vg_abi_witness_align(_: &vg_align_options, _: &vg_alignment) {}
 
 /// safer-ffi derives each struct's C form from the compiled type, by traits that only FFI-safe types have; cbindgen
 /// reads the source text. Neither knows of the other.
@@ -274,6 +283,12 @@ fn every_function() -> Vec<(&'static str, Call)> {
         vg_metrics_pictures(null(), null(), null(), null_mut()) reports;
         vg_metrics_view(null(), null(), null(), null_mut()) reports;
         vg_metrics_surface(null(), null(), 0, null(), null_mut()) reports;
+        vg_align_options_init(null_mut(), 0) status;
+        vg_alignment_init(null_mut(), 0) status;
+        vg_align_scan(null(), 0, null(), 0, null(), 0, null(), null_mut()) reports;
+        vg_align_box(null(), 0, null(), 0, null(), null(), null_mut()) reports;
+        vg_align_points(null(), null(), 0, null_mut(), null_mut(), null_mut()) reports;
+        vg_align_folder(null(), null(), null(), null_mut()) reports;
         vg_scene_options_init(null_mut(), 0) status;
         vg_colmap_open(null(), null(), null_mut()) reports;
         vg_transforms_open(null(), null(), null_mut()) reports;

@@ -32,6 +32,23 @@ pub struct RobustFit {
     pub kept: Vec<bool>,
 }
 
+impl RobustFit {
+    /// Root mean square residual of the pairs kept.
+    pub fn residual(&self) -> f64 {
+        let kept: Vec<f64> =
+            self.residuals.iter().zip(&self.kept).filter(|(_, kept)| **kept).map(|(r, _)| *r).collect();
+        let squares = kept.iter().map(|r| r * r).sum::<f64>();
+        (squares / kept.len().max(1) as f64).sqrt()
+    }
+
+    /// The share of the pairs that were kept, of those beyond the three that any similarity fits: 0 for three pairs,
+    /// which contradict nothing.
+    pub fn confidence(&self) -> f64 {
+        let spare = |n: usize| n.saturating_sub(3) as f64;
+        spare(self.kept.iter().filter(|kept| **kept).count()) / spare(self.kept.len()).max(1.0)
+    }
+}
+
 impl Similarity {
     /// The similarity that takes `from[i]` to `to[i]` for more than half of the pairs. Deterministic.
     ///

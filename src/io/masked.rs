@@ -3,8 +3,8 @@
 use super::scene::SceneFormat;
 use super::{colmap, image, listing};
 use crate::error::{Error, Result};
+use crate::scene::View;
 use crate::scene::view::MAX_VIEWS;
-use crate::scene::{RgbImage, View};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::path::Path;
@@ -60,7 +60,5 @@ fn read_view(listed: &listing::ListedView) -> Result<Option<View>> {
         let reason = format!("{}x{}, but its camera is {width}x{height}", mask.width(), mask.height());
         return Err(Error::format(path, "size", reason));
     }
-    let black = vec![[0; 3]; width as usize * height as usize];
-    let image = RgbImage::new(width, height, black)?;
-    Ok(Some(View { name: listed.name.clone(), camera: listed.camera, image, mask: Some(mask), depth: None }))
+    View::without_picture(listed.name.clone(), listed.camera, Some(mask)).map(Some)
 }

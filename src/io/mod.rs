@@ -29,6 +29,6 @@ pub use scene::{
     NamedCamera, SceneFiles, SceneFormat, SceneIndex, SceneOptions, SceneView, list_scene, open_scene,
 };
 pub use vehicle_frame::{
-    Alignment, FitQuality, read_known_centers, read_matrix, read_vehicle_from_world,
-    vehicle_from_known_centers, write_alignment, write_vehicle_from_world,
+    FitQuality, read_known_centers, read_matrix, read_vehicle_from_world, vehicle_from_known_centers,
+    write_alignment, write_vehicle_from_world,
 };

@@ -4,7 +4,7 @@
 use super::files::{in_file, read_limited, write_atomically};
 use super::{json, listing, select};
 use crate::error::{Error, Result};
-use crate::geometry::Similarity;
+use crate::geometry::{RobustFit, Similarity};
 use glam::DVec3;
 use serde_json::Value;
 use std::path::Path;
@@ -112,32 +112,6 @@ pub fn write_alignment(
     write_atomically(path, |out| out.write_all(text.as_bytes()))
 }
 
-/// A similarity found from camera centres, and how well it fits.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Alignment {
-    /// The least-squares similarity of the cameras kept.
-    pub vehicle_from_world: Similarity,
-    /// How far each camera's centre ends from where it was measured, metres, in the order given.
-    pub residuals: Vec<f64>,
-    /// Whether a camera agrees with the others and was used.
-    pub kept: Vec<bool>,
-}
-
-impl Alignment {
-    /// Root mean square residual of the cameras kept, metres; and as confidence the share of the cameras that were
-    /// kept, of those beyond the three that any similarity fits: 0 for three cameras, which contradict nothing.
-    pub fn quality(&self) -> FitQuality {
-        let kept: Vec<f64> =
-            self.residuals.iter().zip(&self.kept).filter(|(_, kept)| **kept).map(|(r, _)| *r).collect();
-        let squares = kept.iter().map(|r| r * r).sum::<f64>();
-        let spare = |n: usize| n.saturating_sub(3) as f64;
-        FitQuality {
-            residual_m: (squares / kept.len().max(1) as f64).sqrt(),
-            confidence: spare(kept.len()) / spare(self.residuals.len()).max(1.0),
-        }
-    }
-}
-
 /// Reads camera centres in the vehicle's frame, metres: `{"000.png": [x, y, z], ...}`.
 pub fn read_known_centers(path: &Path) -> Result<Vec<(String, DVec3)>> {
     parse_known_centers(&read_limited(path, MAX_FILE)?, path)
@@ -152,14 +126,13 @@ pub fn parse_known_centers(bytes: &[u8], path: &Path) -> Result<Vec<(String, DVe
 /// The similarity that best takes the camera centres of the scene at `path` to known ones; wrong ones are left out
 /// ([`Similarity::umeyama_robust`]). Cameras are known by name as in [`super::SceneOptions::views`]; at least three, not
 /// on one line.
-pub fn vehicle_from_known_centers(path: &Path, known: &[(String, DVec3)]) -> Result<Alignment> {
+pub fn vehicle_from_known_centers(path: &Path, known: &[(String, DVec3)]) -> Result<RobustFit> {
     let listing = listing::list(path, super::colmap_format(path))?;
     let names: Vec<String> = known.iter().map(|(name, _)| name.clone()).collect();
     let chosen = select::select(&listing.views, &names)?;
     let centers: Vec<DVec3> = chosen.into_iter().map(|i| listing.views[i].camera.center()).collect();
     let targets: Vec<DVec3> = known.iter().map(|(_, center)| *center).collect();
-    let fit = Similarity::umeyama_robust(&centers, &targets)?;
-    Ok(Alignment { vehicle_from_world: fit.similarity, residuals: fit.residuals, kept: fit.kept })
+    Similarity::umeyama_robust(&centers, &targets)
 }
 
 #[cfg(test)]

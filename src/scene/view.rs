@@ -33,6 +33,14 @@ pub struct Scene {
 }
 
 impl View {
+    /// A view for what looks at cameras and masks alone: its picture is black.
+    pub fn without_picture(name: String, camera: Camera, mask: Option<Mask>) -> Result<Self> {
+        camera.validate("camera")?;
+        let (width, height) = (camera.width, camera.height);
+        let image = RgbImage::new(width, height, vec![[0; 3]; width as usize * height as usize])?;
+        Ok(Self { name, camera, image, mask, depth: None })
+    }
+
     /// Camera valid, picture, mask and depth of the camera's size; `argument` names the view in the error.
     pub fn validate(&self, argument: &str) -> Result<()> {
         self.camera.validate(&format!("{argument}.camera"))?;

@@ -4,7 +4,7 @@ use crate::tools::{STRICT, assert_golden, cc, cxx, have, root, run, scratch};
 use std::process::Command;
 
 /// The chapters of the header.
-const CHAPTERS: [&str; 16] = [
+const CHAPTERS: [&str; 17] = [
     "version",
     "status",
     "context",
@@ -20,6 +20,7 @@ const CHAPTERS: [&str; 16] = [
     "gradient",
     "segment",
     "metrics",
+    "align",
     "scene",
 ];
 

@@ -333,6 +333,33 @@ void gradients_own_their_numbers_and_a_loss_sees_the_picture(const vg::Gaussians
 
 } // namespace
 
+void worlds_are_aligned() {
+    vg::WorldPoints vehicle;
+    vg::WorldPoints world;
+    for (int i = 0; i < 7; i++) {
+        vehicle.push_back({1.0 * (i % 2), 1.0 * (i / 2 % 2), 0.5 * (i / 4)});
+        world.push_back({4 * vehicle.back()[0] - 1, 4 * vehicle.back()[1], 4 * vehicle.back()[2]});
+    }
+    world[3][2] += 2;
+    std::vector<std::uint8_t> kept;
+    const vg_alignment found = vg::align_points(world, vehicle, &kept).take();
+    CHECK(std::abs(found.scale - 0.25) < 1e-12 && std::abs(found.vehicle_from_world[3] - 0.25) < 1e-12);
+    CHECK(found.used_count == 6 && kept.size() == 7 && kept[3] == 0 && kept[0] == 1);
+    CHECK(vg::align_points(world, vehicle).ok());
+    CHECK(failed(vg::align_points(world, {}), VG_STATUS_ARGUMENT, "vehicle: 0"));
+    CHECK(failed(vg::align_points({}, {}), VG_STATUS_ARGUMENT, "count: 0"));
+
+    const Photographs photographs;
+    const std::vector<vg_view> views(3, photographs.view());
+    const std::vector<std::array<float, 3>> scan(3);
+    const vg::AlignOptions forward(VG_HEADING_FORWARD);
+    CHECK(forward.heading == VG_HEADING_FORWARD && vg::AlignOptions().heading == VG_HEADING_AUTO);
+    CHECK(failed(vg::align_scan(views, {}, scan), VG_STATUS_ARGUMENT, "scan: 3 points"));
+    CHECK(failed(vg::align_scan({}, {}, scan), VG_STATUS_ARGUMENT, "view_count: 0"));
+    CHECK(failed(vg::align_box(views, {}, {4.5, 1.8, 1.5}, forward), VG_STATUS_ARGUMENT, "sparse: 0 points"));
+    CHECK(failed(vg::align_folder("nowhere", "scan.ply"), VG_STATUS_IO, "scan.ply"));
+}
+
 void models_are_measured(const vg::Gaussians &ball) {
     const Photographs photographs;
     const vg_view view = photographs.view();
@@ -377,5 +404,6 @@ int main(int argc, char **argv) {
     pictures_own_their_pixels(made.gaussians);
     gradients_own_their_numbers_and_a_loss_sees_the_picture(made.gaussians);
     models_are_measured(made.gaussians);
+    worlds_are_aligned();
     return 0;
 }

@@ -33,6 +33,16 @@ pub(crate) fn bad_type(argument: &str, found: &str, allowed: &str) -> PyErr {
     PyTypeError::new_err(format!("{argument}: {found}; allowed: {allowed}"))
 }
 
+/// The error of a function that calls its argument `from`, for callers who know it as `to`.
+pub(crate) fn renamed(error: vg::Error, from: &str, to: &str) -> vg::Error {
+    match error {
+        vg::Error::Argument { argument, found, allowed } => {
+            vg::Error::argument(argument.replacen(from, to, 1), found, allowed)
+        }
+        other => other,
+    }
+}
+
 /// The library's error with the arguments' names in Python.
 pub(crate) fn from_library(py: Python<'_>, error: vg::Error) -> PyErr {
     let status = Status::from(&error);
@@ -40,7 +50,7 @@ pub(crate) fn from_library(py: Python<'_>, error: vg::Error) -> PyErr {
         vg::Error::Argument { argument, found, allowed } => {
             let argument = argument.strip_prefix("options.").unwrap_or(&argument);
             let argument = argument.replace("rotations", "quats").replace("budget_s", "budget");
-            let argument = argument.replace("f_score_m", "f_score").replace("scan", "points");
+            let argument = argument.replace("f_score_m", "f_score");
             format!("{}; allowed: {allowed}", [&argument, &*found].join(": "))
         }
         vg::Error::NotBuilt { argument, found, remedy } => {

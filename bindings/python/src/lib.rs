@@ -5,6 +5,7 @@
 //!   none the worse for what its parent drew.
 //! * Whatever goes wrong is a `VgError`, or a `TypeError` for the wrong kind of object; a panic is no exception.
 
+mod align;
 mod arrays;
 mod camera;
 mod errors;
@@ -18,6 +19,8 @@ use pyo3::prelude::*;
 
 #[pymodule]
 mod _native {
+    #[pymodule_export]
+    use crate::align::{align_box, align_folder, align_points, align_scan};
     #[pymodule_export]
     use crate::camera::{Camera, pose_from_box, pose_from_colmap, pose_from_opengl, similarity_from_points};
     #[pymodule_export]

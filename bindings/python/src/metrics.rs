@@ -2,7 +2,7 @@
 
 use crate::arrays::{array, shape_text, values};
 use crate::camera::Camera;
-use crate::errors::{bad_value, from_library, pooled};
+use crate::errors::{bad_value, from_library, pooled, renamed};
 use crate::gaussians::Gaussians;
 use crate::model::Model;
 use crate::reconstruct::{depth, mask, picture};
@@ -93,7 +93,9 @@ pub(crate) fn surface_errors(
     let options = SurfaceOptions { f_score_m: f_score, ..SurfaceOptions::default() };
     options.validate().map_err(|e| from_library(py, e))?;
     let gaussians = &gaussians.get().inner;
-    let e = pooled(py, threads, || SurfaceErrors::with(gaussians, &points, &options))?;
+    let e = pooled(py, threads, || {
+        SurfaceErrors::with(gaussians, &points, &options).map_err(|e| renamed(e, "scan", "points"))
+    })?;
     Ok([
         e.accuracy_m,
         e.completeness_m,

@@ -32,7 +32,7 @@ def test_both_faces_measure_the_same(ellipsoid: Views) -> None:
     view = (a, ellipsoid.masks[0], ellipsoid.cameras[0], ellipsoid.depths[0])
     models = [ball(face, ellipsoid) for face in FACES]
     seen = [face.view_errors(model, *view) for face, model in zip(FACES, models, strict=True)]
-    assert seen[0] == seen[1] and seen[0].silhouette_iou > 0.9 and seen[0].depth_mae_m < 0.1
+    assert seen[0] == seen[1] and seen[0].silhouette_iou > 0.85 and seen[0].depth_mae_m < 0.1
     scan = np.ascontiguousarray(models[0].means)
     surface = [face.surface_errors(model, scan) for face, model in zip(FACES, models, strict=True)]
     assert surface[0] == surface[1] and surface[0].accuracy_m < 0.1

@@ -2,12 +2,12 @@
 //! measured, from the vehicle's size, or from a matrix.
 
 use crate::args::{AlignArgs, Mode};
+use crate::files;
 use crate::job::{Failure, Outcome, Result};
-use crate::{cloud, files};
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use vg::Error;
-use vg::align::{FEWEST_VIEWS, Heading, ScanAlignment, to_box, to_scan};
+use vg::align::{Heading, ScanAlignment, folder_to_scan, masks_of, scan_of, to_box};
 use vg::geometry::Similarity;
 use vg::io::{self, FitQuality, MaskedViews};
 
@@ -25,7 +25,9 @@ struct Found {
 pub(crate) fn run(args: &AlignArgs) -> Result {
     let mode = args.mode();
     let scan = match mode {
-        Mode::Scan(named) => Some(scan_of(&args.scene, named)?),
+        Mode::Scan(named) => {
+            Some(scan_of(&args.scene, named).map_err(|e| self::named(e, &args.scene, named))?)
+        }
         _ => None,
     };
     let input = match mode {
@@ -53,35 +55,17 @@ pub(crate) fn run(args: &AlignArgs) -> Result {
     Ok(Outcome::done(text))
 }
 
-/// The scan that was named, or the one in the scene's folder.
-fn scan_of(scene: &Path, named: Option<&Path>) -> Result<PathBuf> {
-    match named {
-        Some(path) => Ok(path.to_owned()),
-        None => io::find_scan(scene)?.ok_or_else(|| {
-            let scene = scene.display();
-            Failure::job(format!(
-                "--scan: {scene} holds no scan; expected a file name, or one PLY file in 3dscanner_origin or in \
-                 colmap_processed/pcd_rescale"
-            ))
-        }),
-    }
-}
-
 /// The similarity to a scan, of a file or of the scene's folder, and the masks it was found with.
 pub(crate) fn to_scan_of(scene: &Path, scan: Option<&Path>, heading: Heading) -> Result<ScanAlignment> {
-    Ok(by_masks(scene, &scan_of(scene, scan)?, heading)?.1)
+    Ok(by_masks(scene, scan, heading)?.1)
 }
 
-fn by_masks(path: &Path, scan: &Path, heading: Heading) -> Result<(MaskedViews, ScanAlignment)> {
-    let cloud = cloud::read(scan)?;
-    let scene = masked(path)?;
-    let found = to_scan(&scene.views, &scene.points, &cloud, heading);
-    let found = found.map_err(|e| named(e, path, scan))?;
-    Ok((scene, found))
+fn by_masks(path: &Path, scan: Option<&Path>, heading: Heading) -> Result<(MaskedViews, ScanAlignment)> {
+    folder_to_scan(path, scan, heading).map_err(|e| named(e, path, scan))
 }
 
 fn by_scan(args: &AlignArgs, path: &Path) -> Result<Found> {
-    let (scene, found) = by_masks(&args.scene, path, args.heading())?;
+    let (scene, found) = by_masks(&args.scene, Some(path), args.heading())?;
     let mut lines = vec![masks_line(found.views, &scene)];
     lines.push(format!(
         "outlines differ by {:.2} pixels on average, the other way round by {:.2}",
@@ -93,9 +77,9 @@ fn by_scan(args: &AlignArgs, path: &Path) -> Result<Found> {
 }
 
 fn by_box(args: &AlignArgs, size: [f64; 3]) -> Result<Found> {
-    let scene = masked(&args.scene)?;
+    let scene = masks_of(&args.scene)?;
     let found = to_box(&scene.views, &scene.points, size, args.heading());
-    let found = found.map_err(|e| named(e, &args.scene, Path::new("")))?;
+    let found = found.map_err(|e| named(e, &args.scene, None))?;
     let [l, w, h] = found.found_m;
     let lines = vec![
         masks_line(found.views, &scene),
@@ -119,8 +103,9 @@ fn by_centers(args: &AlignArgs, path: &Path) -> Result<Found> {
     let line = |((name, _), (residual, kept)): (&(String, _), (&f64, &bool))| {
         format!("{name}: {residual:.4} m{}", if *kept { "" } else { ", left out: it contradicts the others" })
     };
-    let quality = Some(alignment.quality());
-    Ok(Found { vehicle_from_world: alignment.vehicle_from_world, quality, lines: pairs.map(line).collect() })
+    let quality = FitQuality { residual_m: alignment.residual(), confidence: alignment.confidence() };
+    let lines = pairs.map(line).collect();
+    Ok(Found { vehicle_from_world: alignment.similarity, quality: Some(quality), lines })
 }
 
 fn by_matrix(args: &AlignArgs, path: &Path) -> Result<Found> {
@@ -131,19 +116,6 @@ fn by_matrix(args: &AlignArgs, path: &Path) -> Result<Found> {
     Ok(Found { vehicle_from_world, quality: None, lines: Vec::new() })
 }
 
-fn masked(path: &Path) -> Result<MaskedViews> {
-    let scene = io::read_masked(path)?;
-    if scene.views.len() < FEWEST_VIEWS {
-        return Err(Failure::job(format!(
-            "{}: {} of {} views have a mask; expected at least {FEWEST_VIEWS}, masks/<name of the picture>.png",
-            path.display(),
-            scene.views.len(),
-            scene.views.len() + scene.unmasked
-        )));
-    }
-    Ok(scene)
-}
-
 fn masks_line(used: usize, scene: &MaskedViews) -> String {
     match scene.views.len() + scene.unmasked - used {
         0 => format!("{used} masks"),
@@ -152,11 +124,14 @@ fn masks_line(used: usize, scene: &MaskedViews) -> String {
 }
 
 /// The library's argument as the user wrote it.
-fn named(error: Error, scene: &Path, scan: &Path) -> Failure {
+fn named(error: Error, scene: &Path, scan: Option<&Path>) -> Failure {
     match error {
         Error::Argument { argument, found, allowed } => Failure::job(match argument.as_str() {
             "heading" => format!("--heading: {found}; allowed: {allowed}"),
-            "scan" => format!("--scan {}: {found}; allowed: {allowed}", scan.display()),
+            "scan" => {
+                let scan = scan.map_or_else(String::new, |path| format!(" {}", path.display()));
+                format!("--scan{scan}: {found}; allowed: {allowed}")
+            }
             "size" => format!("--box: {found}; allowed: {allowed}"),
             "sparse" => format!("--box: {}: {found}; allowed: {allowed}", scene.display()),
             other => format!("{}: {other}: {found}; allowed: {allowed}", scene.display()),

@@ -815,7 +815,7 @@ const SIMILARITY: [f64; 16] =
 const POSE: [f64; 12] = [0.0, -1.0, 0.0, 4e5, 1.0, 0.0, 0.0, 5e6, 0.0, 0.0, 1.0, 100.0];
 
 /// A call that works, for each function that can fail.
-pub const CALLS: [fn(&World) -> Call; 47] = [
+pub const CALLS: [fn(&World) -> Call; 53] = [
     context_options_init,
     context_new,
     camera_init,
@@ -859,6 +859,12 @@ pub const CALLS: [fn(&World) -> Call; 47] = [
     metrics_pictures,
     metrics_view,
     metrics_surface,
+    align_options_init,
+    alignment_init,
+    align_scan,
+    align_box,
+    align_points,
+    align_folder,
     scene_options_init,
     colmap_open,
     transforms_open,
@@ -866,7 +872,7 @@ pub const CALLS: [fn(&World) -> Call; 47] = [
 ];
 
 /// `sizeof` in the release that introduced them: no caller has shorter ones.
-pub const FIRST_SIZES: [(&str, usize); 17] = [
+pub const FIRST_SIZES: [(&str, usize); 19] = [
     ("vg_context_options", 16),
     ("vg_camera", 280),
     ("vg_view", 392),
@@ -883,6 +889,8 @@ pub const FIRST_SIZES: [(&str, usize); 17] = [
     ("vg_picture_errors", 32),
     ("vg_view_errors", 64),
     ("vg_surface_errors", 80),
+    ("vg_align_options", 24),
+    ("vg_alignment", 184),
     ("vg_scene_options", 72),
 ];
 
@@ -921,6 +929,8 @@ init_of!(metrics_options_init, vg_metrics_options_init, "options", metrics_optio
 init_of!(picture_errors_init, vg_picture_errors_init, "errors", picture_errors());
 init_of!(view_errors_init, vg_view_errors_init, "errors", view_errors());
 init_of!(surface_errors_init, vg_surface_errors_init, "errors", surface_errors());
+init_of!(align_options_init, vg_align_options_init, "options", align_options(0));
+init_of!(alignment_init, vg_alignment_init, "alignment", alignment());
 init_of!(scene_options_init, vg_scene_options_init, "options", scene_options(0));
 
 fn context_options() -> Lent {
@@ -1635,6 +1645,124 @@ pub fn metrics_surface(w: &World) -> Call {
 }
 
 const SCAN_POINTS: usize = 20;
+
+fn align_options(context: usize) -> Lent {
+    let fields = fields!(vg_align_options {
+        struct_size: elsewhere(),
+        context: elsewhere(),
+        heading: choice(&[0, 1, 2]),
+        flags: reserved(),
+    });
+    let mut lent = Lent::zeroed::<vg_align_options>("vg_align_options", fields);
+    lent.put("context", 0, context as u64);
+    lent
+}
+
+fn alignment() -> Lent {
+    let fields = fields!(vg_alignment {
+        struct_size: elsewhere(),
+        vehicle_from_world[16]: elsewhere(),
+        scale: elsewhere(),
+        residual_m: elsewhere(),
+        confidence: elsewhere(),
+        residual_px: elsewhere(),
+        other_px: elsewhere(),
+        used_count: elsewhere(),
+    });
+    Lent::zeroed::<vg_alignment>("vg_alignment", fields)
+}
+
+/// Points that lie anywhere.
+fn anywhere() -> Vec<f64> {
+    (0..3 * SCAN_POINTS).map(|i| (i as f64).sin()).collect()
+}
+
+/// Views of which cameras and masks are looked at.
+fn masked_views(w: &World) -> (Lent, Vec<Memory>) {
+    let (mut views, memory) = w.views();
+    views.fields.retain(|field| !field.name.starts_with("image") && !field.name.starts_with("depth"));
+    (views, memory)
+}
+
+/// With a scan that shows no surface, which is told last.
+pub fn align_scan(w: &World) -> Call {
+    let (views, mut memory) = masked_views(w);
+    let mut sparse = Memory::of(&anywhere(), 0);
+    let mut scan = Memory::of(&anywhere().iter().map(|v| *v as f32).collect::<Vec<f32>>(), 0);
+    let (world, points) = (sparse.pointer(), scan.pointer());
+    memory.extend([sparse, scan]);
+    let mut call = Call::new("vg_align_scan", invoke!(vg_align_scan 0 1 2 3 4 5 6 7))
+        .argument("views", Value::Struct(views))
+        .argument("view_count", Value::Number(4))
+        .tries(counts(&[0, 4097, 1 << 60, u64::MAX]))
+        .argument("sparse", Value::Handle(world))
+        .argument("sparse_count", Value::Number(SCAN_POINTS as u64))
+        .tries(counts(&[10_000_001, 1 << 60, u64::MAX]))
+        .argument("scan", Value::Handle(points))
+        .argument("scan_count", Value::Number(SCAN_POINTS as u64))
+        .tries(counts(&[0, 10_000_001, 1 << 60, u64::MAX]))
+        .argument("options", Value::Struct(align_options(w.context)))
+        .nullable()
+        .argument("out", Value::OutStruct(alignment()))
+        .memory(memory);
+    call.good = vg_status::Argument;
+    call
+}
+
+/// With points that show no ground, which is told last.
+pub fn align_box(w: &World) -> Call {
+    let (views, mut memory) = masked_views(w);
+    let mut sparse = Memory::of(&anywhere(), 0);
+    let world = sparse.pointer();
+    memory.push(sparse);
+    let mut call = Call::new("vg_align_box", invoke!(vg_align_box 0 1 2 3 4 5 6))
+        .argument("views", Value::Struct(views))
+        .argument("view_count", Value::Number(4))
+        .tries(counts(&[0, 4097, 1 << 60, u64::MAX]))
+        .argument("sparse", Value::Handle(world))
+        .argument("sparse_count", Value::Number(SCAN_POINTS as u64))
+        .tries(counts(&[10_000_001, 1 << 60, u64::MAX]))
+        .argument("size", Value::Doubles(vec![4.5, 1.8, 1.5]))
+        .tries(within64(0.2, 30.0))
+        .argument("options", Value::Struct(align_options(w.context)))
+        .argument("out", Value::OutStruct(alignment()))
+        .memory(memory);
+    call.good = vg_status::Argument;
+    call
+}
+
+pub fn align_points(_: &World) -> Call {
+    let (world, count) = (anywhere(), SCAN_POINTS as u32);
+    let vehicle = world.iter().map(|v| 3.0 * v + 1.0).collect();
+    let mut kept = blank(1, SCAN_POINTS, SCAN_POINTS, 1, false);
+    let mut call = Call::new("vg_align_points", invoke!(vg_align_points 0 1 2 3 4 5))
+        .argument("world", Value::Doubles(world))
+        .tries(finite())
+        .argument("vehicle", Value::Doubles(vehicle))
+        .tries(finite())
+        .argument("count", Value::Number(u64::from(count)))
+        .tries(counts(&[0, 1, 2, 10_000_001, 1 << 60, u64::MAX]))
+        .argument("out", Value::OutStruct(alignment()))
+        .argument("out_kept", Value::Handle(kept.memory.pointer()))
+        .nullable()
+        .argument("out_residuals", Value::OutDoubles(SCAN_POINTS))
+        .nullable();
+    call.targets = vec![kept];
+    call
+}
+
+/// With a file of three points, which is told last.
+pub fn align_folder(w: &World) -> Call {
+    let mut call = Call::new("vg_align_folder", invoke!(vg_align_folder 0 1 2 3))
+        .argument("path", Value::Text(text(&w.sample)))
+        .argument("scan_path", Value::Text(text(w.scratch.join("few.ply"))))
+        .nullable()
+        .argument("options", Value::Struct(align_options(w.context)))
+        .nullable()
+        .argument("out", Value::OutStruct(alignment()));
+    call.good = vg_status::Argument;
+    call
+}
 
 fn scene_options(context: usize) -> Lent {
     let fields = fields!(vg_scene_options {

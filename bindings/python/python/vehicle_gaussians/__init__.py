@@ -11,6 +11,8 @@ axes are x right, y down, z forward; the centre of the top-left pixel is (0.5, 0
 Quaternions are (w, x, y, z). Pictures are RGB, row 0 at the top.
 """
 
+from ._align import align_box, align_folder, align_points, align_scan
+from ._alignment import Alignment
 from ._errors import Status, VgError
 from ._gradients import Gradients, Planes
 from ._measures import PictureErrors, SurfaceErrors, ViewErrors
@@ -30,6 +32,7 @@ from ._reconstruct import Points, Reconstruction, reconstruct
 from ._scene import Scene, open_scene
 
 __all__ = [
+    "Alignment",
     "Camera",
     "Gaussians",
     "Gradients",
@@ -44,6 +47,10 @@ __all__ = [
     "VgError",
     "ViewErrors",
     "__version__",
+    "align_box",
+    "align_folder",
+    "align_points",
+    "align_scan",
     "open_scene",
     "picture_errors",
     "pose_from_box",

@@ -14,6 +14,10 @@ __all__ = [
     "Model",
     "__version__",
     "_panic_on_a_worker_thread",
+    "align_box",
+    "align_folder",
+    "align_points",
+    "align_scan",
     "open_scene",
     "picture_errors",
     "pose_from_box",
@@ -215,6 +219,40 @@ def pose_from_opengl(
 ) -> npt.NDArray[np.float64]: ...
 def pose_from_box(ego_from_vehicle: npt.ArrayLike, ego_from_camera: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
 def similarity_from_points(source: npt.ArrayLike, target: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
+def align_scan(
+    masks: Sequence[npt.NDArray[np.generic] | None],
+    cameras: Sequence[Camera],
+    scan: npt.NDArray[np.float32],
+    sparse: npt.ArrayLike | None,
+    heading: str,
+    names: Sequence[str] | None,
+    threads: int,
+) -> tuple[npt.NDArray[np.float64], float, float, float, float | None, float | None, int]: ...
+def align_box(
+    masks: Sequence[npt.NDArray[np.generic] | None],
+    cameras: Sequence[Camera],
+    sparse: npt.ArrayLike,
+    size: npt.ArrayLike,
+    heading: str,
+    names: Sequence[str] | None,
+    threads: int,
+) -> tuple[npt.NDArray[np.float64], float, float, float, float | None, float | None, int]: ...
+def align_points(
+    world: npt.ArrayLike, vehicle: npt.ArrayLike
+) -> tuple[
+    npt.NDArray[np.float64],
+    float,
+    float,
+    float,
+    float | None,
+    float | None,
+    int,
+    npt.NDArray[np.bool_],
+    npt.NDArray[np.float64],
+]: ...
+def align_folder(
+    path: str | PathLike[str], scan: str | PathLike[str] | None, heading: str, threads: int
+) -> tuple[npt.NDArray[np.float64], float, float, float, float | None, float | None, int]: ...
 def picture_errors(
     a: npt.NDArray[np.generic],
     b: npt.NDArray[np.generic],

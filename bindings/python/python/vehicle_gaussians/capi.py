@@ -33,6 +33,7 @@ from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from ._alignment import Alignment
 from ._errors import Status, VgError
 from ._gradients import Gradients, Planes
 from ._measures import PictureErrors, SurfaceErrors, ViewErrors
@@ -81,6 +82,12 @@ class Symmetry(enum.IntEnum):
     """vg_symmetry"""
 
     AUTO, ALWAYS, NEVER, FLIP = range(4)
+
+
+class Heading(enum.IntEnum):
+    """vg_heading"""
+
+    AUTO, FORWARD, BACKWARD = range(3)
 
 
 class Relight(enum.IntEnum):
@@ -364,6 +371,28 @@ class vg_surface_errors(ct.Structure):
     _fields_ = (("struct_size", ct.c_size_t), *((name, ct.c_double) for name in SurfaceErrors._fields))
 
 
+class vg_align_options(ct.Structure):
+    _fields_ = (
+        ("struct_size", ct.c_size_t),
+        ("context", ct.c_void_p),
+        ("heading", ct.c_int32),
+        ("flags", ct.c_uint32),
+    )
+
+
+class vg_alignment(ct.Structure):
+    _fields_ = (
+        ("struct_size", ct.c_size_t),
+        ("vehicle_from_world", ct.c_double * 16),
+        ("scale", ct.c_double),
+        ("residual_m", ct.c_double),
+        ("confidence", ct.c_double),
+        ("residual_px", ct.c_double),
+        ("other_px", ct.c_double),
+        ("used_count", ct.c_size_t),
+    )
+
+
 class vg_scene_options(ct.Structure):
     _fields_ = (
         ("struct_size", ct.c_size_t),
@@ -484,6 +513,37 @@ PROTOTYPES: Mapping[str, tuple[Any, tuple[Any, ...]]] = {
         _i32,
         (_handle, _numbers, _size, _pointer(vg_metrics_options), _pointer(vg_surface_errors), _out),
     ),
+    "vg_align_options_init": (_i32, (_pointer(vg_align_options), _size)),
+    "vg_alignment_init": (_i32, (_pointer(vg_alignment), _size)),
+    "vg_align_scan": (
+        _i32,
+        (
+            _pointer(vg_view),
+            _size,
+            _numbers,
+            _size,
+            _numbers,
+            _size,
+            _pointer(vg_align_options),
+            _pointer(vg_alignment),
+            _out,
+        ),
+    ),
+    "vg_align_box": (
+        _i32,
+        (
+            _pointer(vg_view),
+            _size,
+            _numbers,
+            _size,
+            _numbers,
+            _pointer(vg_align_options),
+            _pointer(vg_alignment),
+            _out,
+        ),
+    ),
+    "vg_align_points": (_i32, (_numbers, _numbers, _size, _pointer(vg_alignment), _numbers, _numbers, _out)),
+    "vg_align_folder": (_i32, (_text, _text, _pointer(vg_align_options), _pointer(vg_alignment), _out)),
     "vg_scene_options_init": (_i32, (_pointer(vg_scene_options), _size)),
     "vg_colmap_open": (_i32, (_text, _pointer(vg_scene_options), _out, _out)),
     "vg_transforms_open": (_i32, (_text, _pointer(vg_scene_options), _out, _out)),
@@ -1300,6 +1360,113 @@ def surface_errors(
         "vg_metrics_surface", gaussians._handle, points.ctypes.data, len(points), ct.byref(options), ct.byref(errors)
     )
     return SurfaceErrors(*_measures(errors))  # type: ignore[arg-type]
+
+
+def _align_options(heading: str, context: Context | None) -> vg_align_options:
+    options: vg_align_options = _initial(vg_align_options)
+    options.context = None if context is None else context._as_parameter_
+    options.heading = _choice(Heading, "heading", heading)
+    return options
+
+
+def _alignment(found: vg_alignment) -> Alignment:
+    matrix = np.array(found.vehicle_from_world).reshape(4, 4)
+    residual_px, other_px = (None if value != value else value for value in (found.residual_px, found.other_px))
+    return Alignment(
+        matrix, found.scale, found.residual_m, found.confidence, residual_px, other_px, found.used_count
+    )
+
+
+def _masked_views(
+    masks: Sequence[npt.NDArray[Any] | None], cameras: Sequence[Camera], names: Sequence[str] | None, alive: list[Any]
+) -> ct.Array[vg_view]:
+    for argument, entries in (("masks", masks), ("names", names)):
+        if entries is not None and len(entries) != len(cameras):
+            allowed = f"one for each of {len(cameras)} cameras"
+            raise VgError(Status.ARGUMENT, f"{argument}: {len(entries)}; allowed: {allowed}")
+    views = (vg_view * len(cameras))()
+    for i, (mask, camera) in enumerate(zip(masks, cameras, strict=True)):
+        views[i] = _initial(vg_view)
+        views[i].camera = _camera(camera)
+        views[i].name = (names[i] if names is not None else f"{i:03}").encode()
+        if mask is not None:
+            views[i].mask = _mask(mask, f"masks[{i}]", alive)
+    return views
+
+
+def _points(points: npt.ArrayLike | None, argument: str, dtype: type) -> npt.NDArray[Any]:
+    """(n, 3) in row order; none for None."""
+    array = np.require([] if points is None else points, dtype, ["C", "A"])
+    if points is None:
+        array = array.reshape(0, 3)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise VgError(Status.ARGUMENT, f"{argument}: shape {array.shape}; allowed: (n, 3)")
+    return array
+
+
+def align_scan(
+    masks: Sequence[npt.NDArray[Any] | None],
+    cameras: Sequence[Camera],
+    scan: npt.NDArray[np.float32],
+    sparse: npt.ArrayLike | None = None,
+    *,
+    heading: str = "auto",
+    names: Sequence[str] | None = None,
+    context: Context | None = None,
+) -> Alignment:
+    """The vehicle's frame by points scanned on the vehicle; the arguments are those of vehicle_gaussians.align_scan."""
+    _expect(scan, "scan", np.float32)
+    alive: list[Any] = []
+    views, found = _masked_views(masks, cameras, names, alive), _initial(vg_alignment)
+    world, scanned = _points(sparse, "sparse", np.float64), _points(scan, "scan", np.float32)
+    lists = (views, len(views), world.ctypes.data, len(world), scanned.ctypes.data, len(scanned))
+    _call("vg_align_scan", *lists, ct.byref(_align_options(heading, context)), ct.byref(found))
+    return _alignment(found)
+
+
+def align_box(
+    masks: Sequence[npt.NDArray[Any] | None],
+    cameras: Sequence[Camera],
+    sparse: npt.ArrayLike,
+    size: npt.ArrayLike,
+    *,
+    heading: str,
+    names: Sequence[str] | None = None,
+    context: Context | None = None,
+) -> Alignment:
+    """The vehicle's frame by its size and the ground; the arguments are those of vehicle_gaussians.align_box."""
+    alive: list[Any] = []
+    views, found = _masked_views(masks, cameras, names, alive), _initial(vg_alignment)
+    world, sides = _points(sparse, "sparse", np.float64), _doubles(size, (3,))
+    lists = (views, len(views), world.ctypes.data, len(world), sides.ctypes.data)
+    _call("vg_align_box", *lists, ct.byref(_align_options(heading, context)), ct.byref(found))
+    return _alignment(found)
+
+
+def align_points(world: npt.ArrayLike, vehicle: npt.ArrayLike) -> Alignment:
+    """The similarity between points known in both frames; the arguments are those of vehicle_gaussians.align_points."""
+    source, target = _points(world, "world", np.float64), _points(vehicle, "vehicle", np.float64)
+    if len(source) != len(target):
+        raise VgError(Status.ARGUMENT, f"vehicle: {len(target)}; allowed: as many as world, {len(source)}")
+    found, kept = _initial(vg_alignment), np.zeros(len(source), np.bool_)
+    residuals = np.empty(len(source))
+    lists = (source.ctypes.data, target.ctypes.data, len(source))
+    _call("vg_align_points", *lists, ct.byref(found), kept.ctypes.data, residuals.ctypes.data)
+    return _alignment(found)._replace(kept=kept, residuals_m=residuals)
+
+
+def align_folder(
+    path: str | os.PathLike[str],
+    scan: str | os.PathLike[str] | None = None,
+    *,
+    heading: str = "auto",
+    context: Context | None = None,
+) -> Alignment:
+    """align_scan with the files of a scene; the arguments are those of vehicle_gaussians.align_folder."""
+    found, file = _initial(vg_alignment), None if scan is None else os.fsencode(scan)
+    options = _align_options(heading, context)
+    _call("vg_align_folder", os.fsencode(path), file, ct.byref(options), ct.byref(found))
+    return _alignment(found)
 
 
 class Scene(NamedTuple):

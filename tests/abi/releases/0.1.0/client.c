@@ -599,6 +599,47 @@ static void measure(const vg_gaussians *car, const vg_view *view, vg_context *co
     FAILS(vg_metrics_pictures(NULL, &view->image, NULL, &pictures, &error), VG_STATUS_ARGUMENT, "a: NULL");
 }
 
+/* The sample's cameras, which stand in the vehicle's frame, back into it from a world of twice the size. */
+static void align(const vg_view *views, size_t count, vg_context *context) {
+    static const double places[6][3] = {{0, 0, 0}, {4, 0, 0}, {0, 2, 0}, {0, 0, 2}, {4, 2, 0}, {4, 2, 2}};
+    double world[6][3], residuals[6];
+    uint8_t kept[6];
+    float scan[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    double size[3] = {4.5, 1.8, 1.5};
+    vg_align_options options;
+    vg_alignment found;
+    vg_error *error = NULL;
+    size_t i, k;
+
+    CHECK(vg_align_options_init(&options, sizeof options) == VG_STATUS_OK && options.heading == VG_HEADING_AUTO);
+    options.context = context;
+    CHECK(vg_alignment_init(&found, sizeof found) == VG_STATUS_OK && isnan(found.scale) && found.used_count == 0);
+    for (i = 0; i < 6; i++) {
+        for (k = 0; k < 3; k++) {
+            world[i][k] = 2 * places[i][k] + (double)k;
+        }
+    }
+    DO(vg_align_points(&world[0][0], &places[0][0], 6, &found, kept, residuals, &error));
+    CHECK(near_to(found.scale, 0.5, 1e-12) && found.confidence == 1 && found.residual_m < 1e-12);
+    CHECK(found.used_count == 6 && isnan(found.residual_px) && isnan(found.other_px));
+    CHECK(near_to(found.vehicle_from_world[0], 0.5, 1e-12) && near_to(found.vehicle_from_world[7], -0.5, 1e-12));
+    for (i = 0; i < 6; i++) {
+        CHECK(kept[i] == 1 && residuals[i] < 1e-12);
+    }
+    world[5][1] += 1;
+    DO(vg_align_points(&world[0][0], &places[0][0], 6, &found, kept, NULL, &error));
+    CHECK(found.used_count == 5 && kept[5] == 0 && kept[0] == 1);
+    FAILS(vg_align_points(&world[0][0], &places[0][0], 2, &found, NULL, NULL, &error), VG_STATUS_ARGUMENT, "count: 2");
+
+    FAILS(vg_align_scan(views, count, NULL, 0, &scan[0][0], 3, &options, &found, &error), VG_STATUS_ARGUMENT, "scan: 3 points");
+    FAILS(vg_align_box(views, count, NULL, 0, size, &options, &found, &error), VG_STATUS_ARGUMENT, "sparse: 0 points");
+    options.heading = VG_HEADING_BACKWARD + 1;
+    FAILS(vg_align_folder(sample, "no.ply", &options, &found, &error), VG_STATUS_ARGUMENT, "options.heading: 3");
+    options.heading = VG_HEADING_FORWARD;
+    FAILS(vg_align_folder(sample, "no.ply", &options, &found, &error), VG_STATUS_IO, "no.ply");
+    FAILS(vg_align_folder(sample, NULL, &options, &found, &error), VG_STATUS_ARGUMENT, "scan_path: ");
+}
+
 int main(int argc, char **argv) {
     vg_context_options settings;
     vg_context *context = NULL;
@@ -640,6 +681,7 @@ int main(int argc, char **argv) {
     print_hash("sh", vg_gaussians_sh(car), n * 27 * sizeof(float));
     derive(car);
     render(car, &views[0].camera, context);
+    align(views, 4, context);
     measure(car, &views[0], context);
     go_back(context);
 

@@ -436,6 +436,35 @@ typedef int32_t vg_relight;
 #endif // __cplusplus
 
 /**
+ * How front and back are told apart.
+ */
+enum vg_heading
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * By shape; where the other way round fits as well, it is an error that names the view to look at.
+     */
+    VG_HEADING_AUTO = 0,
+    /**
+     * The first view by name, of those not taken from abeam, was taken from ahead of the vehicle's middle.
+     */
+    VG_HEADING_FORWARD = 1,
+    /**
+     * It was taken from behind the middle.
+     */
+    VG_HEADING_BACKWARD = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_heading vg_heading;
+#else
+typedef int32_t vg_heading;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * What may not be left out although the scene does not need it; bits of `vg_options.keep`.
  */
 enum vg_keep
@@ -1526,6 +1555,68 @@ typedef struct vg_surface_errors {
 } vg_surface_errors;
 
 /**
+ * Settings of `vg_align_scan`, `vg_align_box` and `vg_align_folder`.
+ */
+typedef struct vg_align_options {
+    /**
+     * `sizeof(vg_align_options)`.
+     */
+    size_t struct_size;
+    /**
+     * Threads to use. NULL: made for this call, one per core.
+     */
+    struct vg_context *context;
+    /**
+     * A `vg_heading`. Default `VG_HEADING_AUTO`.
+     */
+    int32_t heading;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t flags;
+} vg_align_options;
+
+/**
+ * A similarity that was found, and how well it fits; NAN where a measure does not exist.
+ */
+typedef struct vg_alignment {
+    /**
+     * `sizeof(vg_alignment)`.
+     */
+    size_t struct_size;
+    /**
+     * From the world to the vehicle's frame, metres: row-major 4x4, as `vg_scene_options` and `vg_pose_from_colmap`
+     * take it.
+     */
+    double vehicle_from_world[16];
+    /**
+     * Metres per unit of the world.
+     */
+    double scale;
+    /**
+     * Typical distance of what should coincide, metres: of outlines from a scan's, of sides from a box's, of points
+     * from where they were measured.
+     */
+    double residual_m;
+    /**
+     * 0 to 1; at 0 another answer fits as well.
+     */
+    double confidence;
+    /**
+     * Mean distance between the outlines of scan and masks, pixels; NAN without a scan.
+     */
+    double residual_px;
+    /**
+     * The same with front and back exchanged.
+     */
+    double other_px;
+    /**
+     * Views, or points, that the similarity was found from.
+     */
+    size_t used_count;
+} vg_alignment;
+
+/**
  * What of a scene is wanted, and what its files do not say.
  */
 typedef struct vg_scene_options {
@@ -2215,6 +2306,103 @@ vg_status vg_metrics_surface(const struct vg_gaussians *gaussians,
                              const struct vg_metrics_options *options,
                              struct vg_surface_errors *out,
                              struct vg_error **out_error);
+
+/**
+ * Sets `*options` to the default values. `size`: `sizeof *options`.
+ */
+VG_API
+vg_status vg_align_options_init(struct vg_align_options *options,
+                                size_t size);
+
+/**
+ * Sets `*alignment` to NAN throughout, and its count to 0. `size`: `sizeof *alignment`.
+ */
+VG_API
+vg_status vg_alignment_init(struct vg_alignment *alignment,
+                            size_t size);
+
+/**
+ * Finds the vehicle's frame with points scanned on the vehicle: their outline must run along the edges of all masks.
+ *
+ * - views, view_count: an array, as for `vg_reconstruct`, whose cameras have poses in the world, whatever its units.
+ *   Masks are looked at, at least 3 of them; a photograph only where there is no mask, for its alpha: its `data` may
+ *   be NULL, and a view with neither is left out.
+ * - sparse: double `[sparse_count][3]` without gaps, points of the world that may show anything; NULL with 0.
+ * - scan: float32 `[scan_count][3]` without gaps, metres, vehicle frame; not NULL.
+ * - scan_count: 1 to 10 million.
+ * - options: NULL for the default values.
+ * - out: a struct that `vg_alignment_init` was called for; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_align_scan(const struct vg_view *views,
+                        size_t view_count,
+                        const double *sparse,
+                        size_t sparse_count,
+                        const float *scan,
+                        size_t scan_count,
+                        const struct vg_align_options *options,
+                        struct vg_alignment *out,
+                        struct vg_error **out_error);
+
+/**
+ * Finds the vehicle's frame by its size and the ground. Front and back are the same to a box: `options.heading` must
+ * tell. The origin is the box's middle.
+ *
+ * - views, view_count: as for `vg_align_scan`, from all around.
+ * - sparse: double `[sparse_count][3]` without gaps, points of the world, of which some show level ground; not NULL.
+ * - size: 3 numbers, length, width and height, metres.
+ * - options: not NULL, for the heading.
+ * - out: a struct that `vg_alignment_init` was called for; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_align_box(const struct vg_view *views,
+                       size_t view_count,
+                       const double *sparse,
+                       size_t sparse_count,
+                       const double *size,
+                       const struct vg_align_options *options,
+                       struct vg_alignment *out,
+                       struct vg_error **out_error);
+
+/**
+ * Finds the similarity that takes points of the world, the cameras' centres for one, to where they were measured (GPS,
+ * ego poses), for more than half of them; those that contradict the others are left out, if there are 6 and more.
+ *
+ * - world, vehicle: double `[count][3]` without gaps, the same points in the world, and in the vehicle's frame in
+ *   metres; not on one line. Not NULL.
+ * - count: at least 3.
+ * - out: a struct that `vg_alignment_init` was called for; unchanged on failure.
+ * - out_kept: `count` bytes, 1 where a point was used, 0 where it was left out; NULL: not wanted.
+ * - out_residuals: `count` numbers, how far each point ends from its place, metres; NULL: not wanted.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_align_points(const double *world,
+                          const double *vehicle,
+                          size_t count,
+                          struct vg_alignment *out,
+                          uint8_t *out_kept,
+                          double *out_residuals,
+                          struct vg_error **out_error);
+
+/**
+ * `vg_align_scan` with the files of a scene, which need not be read first: the cameras, the masks (or the pictures'
+ * alpha) and the sparse points of a COLMAP folder, of one of 3DRealCar, or of a `transforms.json`.
+ *
+ * - path: the folder; not NULL.
+ * - scan_path: a PLY file of points, metres, vehicle frame. NULL: the scan in a folder of 3DRealCar.
+ * - options: NULL for the default values.
+ * - out: a struct that `vg_alignment_init` was called for; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_align_folder(const char *path,
+                          const char *scan_path,
+                          const struct vg_align_options *options,
+                          struct vg_alignment *out,
+                          struct vg_error **out_error);
 
 /**
  * Sets `*options` to the default values. `size`: `sizeof *options`.

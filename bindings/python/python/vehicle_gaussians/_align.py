@@ -1,0 +1,79 @@
+"""From the world of a structure-from-motion model to the vehicle's frame."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _native
+from ._alignment import Alignment
+
+if TYPE_CHECKING:
+    from ._native import Camera
+
+
+def align_scan(
+    masks: Sequence[npt.NDArray[Any] | None],
+    cameras: Sequence[Camera],
+    scan: npt.NDArray[np.float32],
+    sparse: npt.ArrayLike | None = None,
+    *,
+    heading: str = "auto",
+    names: Sequence[str] | None = None,
+    threads: int = 0,
+) -> Alignment:
+    """The vehicle's frame by points scanned on the vehicle: their outline must run along the edges of all masks.
+
+    masks: one for each camera, of which at least 3 are not None. cameras: with poses in the world, whose place,
+    direction and unit are anything. scan: float32 (n, 3), metres, vehicle frame. sparse: (n, 3), points of the world that
+    may show anything. heading: "auto", which refuses to guess where front and back fit as well; "forward": the first
+    view by name, of those not taken from abeam, was taken from ahead of the vehicle's middle; "backward": from behind.
+    names: of the views, for messages; "000", "001", ... if not given. threads: worker threads; 0 means one per core.
+    """
+    return Alignment(*_native.align_scan(masks, cameras, scan, sparse, heading, names, threads))
+
+
+def align_box(
+    masks: Sequence[npt.NDArray[Any] | None],
+    cameras: Sequence[Camera],
+    sparse: npt.ArrayLike,
+    size: npt.ArrayLike,
+    *,
+    heading: str,
+    names: Sequence[str] | None = None,
+    threads: int = 0,
+) -> Alignment:
+    """The vehicle's frame by its size and the ground; its origin is the box's middle.
+
+    size: length, width and height, metres. sparse: points of the world, of which some show level ground around the
+    vehicle. heading: "forward" or "backward"; a box does not tell. The others are as for ``align_scan``, with masks from
+    all around.
+    """
+    return Alignment(*_native.align_box(masks, cameras, sparse, size, heading, names, threads))
+
+
+def align_points(world: npt.ArrayLike, vehicle: npt.ArrayLike) -> Alignment:
+    """The similarity that takes points of the world, the cameras' centres for one, to where they were measured.
+
+    world, vehicle: (n, 3), the same points in both frames, the second in metres; at least 3, not on one line. Of 6 and
+    more, those that contradict the others are left out.
+    """
+    return Alignment(*_native.align_points(world, vehicle))
+
+
+def align_folder(
+    path: str | os.PathLike[str],
+    scan: str | os.PathLike[str] | None = None,
+    *,
+    heading: str = "auto",
+    threads: int = 0,
+) -> Alignment:
+    """``align_scan`` with the files of a scene: a COLMAP folder, one of 3DRealCar, or a ``transforms.json``.
+
+    scan: a PLY file of points, metres, vehicle frame; the scan in a folder of 3DRealCar if not given.
+    """
+    return Alignment(*_native.align_folder(path, scan, heading, threads))

@@ -1,0 +1,177 @@
+//! From the world of a structure-from-motion model to the vehicle's frame; `vehicle_gaussians._align` names the numbers.
+
+use crate::arrays::{array, matrix4, numbers, owned, shape_text, values, vector};
+use crate::camera::Camera;
+use crate::errors::{bad_value, from_library, pooled, renamed};
+use crate::reconstruct::mask;
+use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use vg::View;
+use vg::align::{BoxAlignment, Heading, ScanAlignment, folder_to_scan, to_box, to_scan};
+use vg::geometry::Similarity;
+use vg::scene::Cloud;
+
+/// A matrix.
+type Matrix<'py> = Bound<'py, PyArray2<f64>>;
+
+/// vehicle_from_world, scale, residual, confidence, outlines' distance and that of the other way round, how many were
+/// used.
+type Found<'py> = (Matrix<'py>, f64, f64, f64, Option<f64>, Option<f64>, usize);
+
+#[pyfunction]
+#[pyo3(signature = (masks, cameras, scan, sparse, heading, names, threads))]
+pub(crate) fn align_scan<'py>(
+    py: Python<'py>,
+    masks: Vec<Option<Bound<'py, PyAny>>>,
+    cameras: Vec<Bound<'py, Camera>>,
+    scan: &Bound<'py, PyAny>,
+    sparse: Option<&Bound<'py, PyAny>>,
+    heading: &str,
+    names: Option<Vec<String>>,
+    threads: usize,
+) -> PyResult<Found<'py>> {
+    let scan = array::<f32>(scan, "scan", "a NumPy array of float32, metres, (n, 3)")?;
+    if !matches!(scan.shape(), [_, 3]) {
+        return Err(bad_value(py, "scan", &shape_text(scan.shape()), "(n, 3)"));
+    }
+    // A copy: others may write to the array while the library works.
+    let points = values(&scan)?.as_chunks::<3>().0.to_vec();
+    let views = views_of(py, &masks, &cameras, names)?;
+    let sparse = sparse.map_or_else(|| Ok(Vec::new()), |object| rows(object, "sparse"))?;
+    let heading = heading_of(py, heading)?;
+    let found = pooled(py, threads, || {
+        let scan = Cloud::new(points).map_err(|e| renamed(e, "cloud", "scan"))?;
+        to_scan(&views, &sparse.iter().map(|&p| p.into()).collect::<Vec<_>>(), &scan, heading)
+    })?;
+    Ok(by_scan(py, &found))
+}
+
+#[pyfunction]
+#[pyo3(signature = (masks, cameras, sparse, size, heading, names, threads))]
+pub(crate) fn align_box<'py>(
+    py: Python<'py>,
+    masks: Vec<Option<Bound<'py, PyAny>>>,
+    cameras: Vec<Bound<'py, Camera>>,
+    sparse: &Bound<'py, PyAny>,
+    size: &Bound<'py, PyAny>,
+    heading: &str,
+    names: Option<Vec<String>>,
+    threads: usize,
+) -> PyResult<Found<'py>> {
+    let views = views_of(py, &masks, &cameras, names)?;
+    let (sparse, size) = (rows(sparse, "sparse")?, vector::<3>(size, "size")?);
+    let heading = heading_of(py, heading)?;
+    let BoxAlignment { vehicle_from_world, residual_m, confidence, views, .. } = pooled(py, threads, || {
+        to_box(&views, &sparse.iter().map(|&p| p.into()).collect::<Vec<_>>(), size, heading)
+    })?;
+    Ok(found(py, &vehicle_from_world, residual_m, confidence, None, views))
+}
+
+/// What is [`Found`], which pairs were used, and how far each ends from its place.
+type Fitted<'py> = (
+    Matrix<'py>,
+    f64,
+    f64,
+    f64,
+    Option<f64>,
+    Option<f64>,
+    usize,
+    Bound<'py, PyArray1<bool>>,
+    Bound<'py, PyArray1<f64>>,
+);
+
+#[pyfunction]
+#[pyo3(signature = (world, vehicle))]
+pub(crate) fn align_points<'py>(
+    world: &Bound<'py, PyAny>,
+    vehicle: &Bound<'py, PyAny>,
+) -> PyResult<Fitted<'py>> {
+    let py = world.py();
+    let (from, to) = (rows(world, "world")?, rows(vehicle, "vehicle")?);
+    if from.len() != to.len() {
+        let allowed = format!("as many as world, {}", from.len());
+        return Err(bad_value(py, "vehicle", &to.len().to_string(), &allowed));
+    }
+    let points = |rows: Vec<[f64; 3]>| rows.into_iter().map(Into::into).collect::<Vec<_>>();
+    let fit = Similarity::umeyama_robust(&points(from), &points(to))
+        .map_err(|e| from_library(py, renamed(e, "points", "world, vehicle")))?;
+    let used = fit.kept.iter().filter(|kept| **kept).count();
+    let (matrix, scale, residual, confidence, ..) =
+        found(py, &fit.similarity, fit.residual(), fit.confidence(), None, used);
+    let n = fit.kept.len();
+    let (kept, residuals) = (owned(py, n, fit.kept), owned(py, n, fit.residuals));
+    Ok((matrix, scale, residual, confidence, None, None, used, kept, residuals))
+}
+
+#[pyfunction]
+#[pyo3(signature = (path, scan, heading, threads))]
+pub(crate) fn align_folder<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    scan: Option<PathBuf>,
+    heading: &str,
+    threads: usize,
+) -> PyResult<Found<'py>> {
+    let heading = heading_of(py, heading)?;
+    let (_, found) = pooled(py, threads, || folder_to_scan(&path, scan.as_deref(), heading))?;
+    Ok(by_scan(py, &found))
+}
+
+fn by_scan<'py>(py: Python<'py>, scan: &ScanAlignment) -> Found<'py> {
+    let outlines = Some((scan.residual_px, scan.other_px));
+    found(py, &scan.vehicle_from_world, scan.residual_m, scan.confidence, outlines, scan.views)
+}
+
+fn found<'py>(
+    py: Python<'py>,
+    vehicle_from_world: &Similarity,
+    residual_m: f64,
+    confidence: f64,
+    outlines_px: Option<(f64, f64)>,
+    used: usize,
+) -> Found<'py> {
+    let matrix = matrix4(py, &vehicle_from_world.to_row_major());
+    let (residual_px, other_px) = outlines_px.unzip();
+    (matrix, vehicle_from_world.scale, residual_m, confidence, residual_px, other_px, used)
+}
+
+fn views_of(
+    py: Python<'_>,
+    masks: &[Option<Bound<'_, PyAny>>],
+    cameras: &[Bound<'_, Camera>],
+    names: Option<Vec<String>>,
+) -> PyResult<Vec<View>> {
+    for (argument, length) in [("masks", Some(masks.len())), ("names", names.as_ref().map(Vec::len))] {
+        if let Some(n) = length.filter(|n| *n != cameras.len()) {
+            let allowed = format!("one for each of {} cameras", cameras.len());
+            return Err(bad_value(py, argument, &n.to_string(), &allowed));
+        }
+    }
+    let view = |(i, camera): (usize, &Bound<'_, Camera>)| {
+        let camera = camera.get().inner;
+        let mask = masks[i].as_ref().map(|object| mask(object, &format!("masks[{i}]"), &camera)).transpose()?;
+        let name = names.as_ref().map_or_else(|| format!("{i:03}"), |names| names[i].clone());
+        View::without_picture(name, camera, mask).map_err(|e| from_library(py, e))
+    };
+    cameras.iter().enumerate().map(view).collect()
+}
+
+/// Points in three columns.
+fn rows(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<Vec<[f64; 3]>> {
+    let allowed = "an (n, 3) array";
+    let (shape, values) = numbers(object, argument, allowed)?;
+    match shape[..] {
+        [_, 3] => Ok(values.as_chunks::<3>().0.to_vec()),
+        _ => Err(bad_value(object.py(), argument, &shape_text(&shape), allowed)),
+    }
+}
+
+fn heading_of(py: Python<'_>, name: &str) -> PyResult<Heading> {
+    match name {
+        "auto" => Ok(Heading::Auto),
+        "forward" => Ok(Heading::Forward),
+        "backward" => Ok(Heading::Backward),
+        other => Err(bad_value(py, "heading", &format!("{other:?}"), "auto, forward, backward")),
+    }
+}

@@ -1,0 +1,45 @@
+//! A scene on disk to a scan on disk.
+
+use super::{FEWEST_VIEWS, Heading, ScanAlignment, to_scan};
+use crate::error::{Error, Result};
+use crate::io::{self, MaskedViews};
+use crate::scene::Cloud;
+use std::path::{Path, PathBuf};
+
+/// The scan that was named, else the one in the folder of a vehicle of 3DRealCar.
+pub fn scan_of(folder: &Path, named: Option<&Path>) -> Result<PathBuf> {
+    let found = named.map_or_else(|| io::find_scan(folder), |path| Ok(Some(path.to_owned())))?;
+    found.ok_or_else(|| {
+        let none = format!("{} holds no scan", folder.display());
+        let places = "one PLY file in 3dscanner_origin or in colmap_processed/pcd_rescale";
+        Error::argument("scan", none, format!("a file name, or {places}"))
+    })
+}
+
+/// The masks and sparse points of a scene on disk, of which alignment needs [`FEWEST_VIEWS`].
+pub fn masks_of(folder: &Path) -> Result<MaskedViews> {
+    let scene = io::read_masked(folder)?;
+    if scene.views.len() < FEWEST_VIEWS {
+        let (with, all) = (scene.views.len(), scene.views.len() + scene.unmasked);
+        let reason = format!(
+            "{with} of {all} views have a mask; expected at least {FEWEST_VIEWS}, masks/<name of the picture>.png"
+        );
+        return Err(Error::format(folder, "masks", reason));
+    }
+    Ok(scene)
+}
+
+/// [`to_scan`] with the masks, the sparse points and the scan (PLY, metres, vehicle frame) of files; the masks come
+/// with the result. `scan` as in [`scan_of`].
+pub fn folder_to_scan(
+    folder: &Path,
+    scan: Option<&Path>,
+    heading: Heading,
+) -> Result<(MaskedViews, ScanAlignment)> {
+    let path = scan_of(folder, scan)?;
+    let (points, _) = io::ply::read_points(&path)?;
+    let cloud = Cloud::new(points).map_err(|e| Error::format(&path, "vertex", e.to_string()))?;
+    let scene = masks_of(folder)?;
+    let found = to_scan(&scene.views, &scene.points, &cloud, heading)?;
+    Ok((scene, found))
+}
