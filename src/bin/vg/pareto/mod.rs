@@ -1,5 +1,6 @@
 //! `vg pareto`: error against run time over a sweep of settings.
 
+mod labels;
 mod plot;
 
 use crate::args::ParetoArgs;

@@ -1,6 +1,6 @@
 //! The sweep as a picture: error against run time, SVG.
 
-use super::{Point, place};
+use super::{Point, labels, place};
 use std::fmt::Write;
 
 const SIZE: [f64; 2] = [860.0, 520.0];
@@ -103,14 +103,17 @@ pub(super) fn svg(points: &[Point], title: &str) -> Option<String> {
 
     let mut front: Vec<&Mark> = rows.iter().filter(|r| r.on_front).collect();
     front.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
-    let places: Vec<String> =
-        front.iter().map(|r| format!("{:.1},{:.1}", x.at(r.seconds), y.at(r.psnr))).collect();
+    let front: Vec<[f64; 2]> = front.iter().map(|r| [x.at(r.seconds), y.at(r.psnr)]).collect();
+    let places: Vec<String> = front.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
     let _ = writeln!(
         out,
         "<polyline points=\"{}\" fill=\"none\" stroke=\"{FRONT}\" stroke-width=\"1.5\"/>",
         places.join(" ")
     );
-    for row in &rows {
+    let named: Vec<([f64; 2], &str)> =
+        rows.iter().map(|r| ([x.at(r.seconds), y.at(r.psnr)], r.name)).collect();
+    let names = labels::places(&named, &front, [x.from, y.to - 10.0, x.to, y.from]);
+    for (row, [name_x, name_y]) in rows.iter().zip(names) {
         let color = if row.on_front { FRONT } else { BEHIND };
         let (at_x, at_y) = (x.at(row.seconds), y.at(row.psnr));
         let [y0, y1] = row.psnr_range.map(|v| y.at(v));
@@ -119,9 +122,7 @@ pub(super) fn svg(points: &[Point], title: &str) -> Option<String> {
             out,
             "<path d=\"M{at_x:.1} {y0:.1}V{y1:.1}M{x0:.1} {at_y:.1}H{x1:.1}\" stroke=\"{color}\" \
              stroke-opacity=\"0.4\"/>\n<circle cx=\"{at_x:.1}\" cy=\"{at_y:.1}\" r=\"4\" fill=\"{color}\"/>\n\
-             <text x=\"{:.1}\" y=\"{:.1}\" fill=\"{color}\">{}</text>",
-            at_x + 7.0,
-            at_y + 17.0,
+             <text x=\"{name_x:.1}\" y=\"{name_y:.1}\" fill=\"{color}\">{}</text>",
             escaped(row.name)
         );
     }
