@@ -139,7 +139,9 @@ fn a_box_on_the_ground_gives_the_frame_once_the_front_is_known() {
     refused(&points, size, Heading::Auto, "heading: auto, but a box is the same");
     refused(&[], size, Heading::Forward, "sparse: 0 points that show no ground");
     refused(&points, [4.2, 1.8, 0.0], Heading::Forward, "size");
-    refused(&points, [3.0, 3.0, 3.0], Heading::Forward, "does not fit the masks' hull");
+    let other = [3.0, 3.0, 3.0];
+    refused(&points, other, Heading::Forward, "does not fit the masks' hull");
+    refused(&points, other, Heading::Forward, "check that the size is of this vehicle and in metres");
 }
 
 #[test]

@@ -58,9 +58,7 @@ fn outlines(views: &[View]) -> Result<Vec<Outline>> {
     Ok(seen)
 }
 
-fn nowhere(reason: &str) -> Error {
-    Error::Reconstruction {
-        stage: "align",
-        reason: format!("{reason}; check that the scan is of this vehicle and in metres, and the masks"),
-    }
+/// No alignment fits. `check`: what of the caller's, beside the masks, may be why.
+fn nowhere(reason: &str, check: &str) -> Error {
+    Error::Reconstruction { stage: "align", reason: format!("{reason}; check {check}, and the masks") }
 }

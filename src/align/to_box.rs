@@ -67,7 +67,7 @@ pub fn to_box(views: &[View], sparse: &[DVec3], size: [f64; 3], heading: Heading
     let ground = up.dot(on_ground);
     let points: Vec<DVec3> = points.into_iter().filter(|p| p.z > ground).collect();
     if points.is_empty() {
-        return Err(nowhere("nothing above the ground is in all masks"));
+        return Err(nowhere("nothing above the ground is in all masks", "the sparse points"));
     }
     let top = points.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max) + 0.5 * between;
     let footprint = Footprint::new(points.iter().map(|p| p.truncate()).collect());
@@ -84,10 +84,11 @@ pub fn to_box(views: &[View], sparse: &[DVec3], size: [f64; 3], heading: Heading
     }
     if fit.residual > WORST_SHARE * size.max_element() {
         let [l, w, h] = fit.found.to_array();
-        return Err(nowhere(&format!(
-            "a box of {} x {} x {} m does not fit the masks' hull, at best {l:.2} x {w:.2} x {h:.2} m",
+        let reason = format!(
+            "a box of {:.2} x {:.2} x {:.2} m does not fit the masks' hull, at best {l:.2} x {w:.2} x {h:.2} m",
             size.x, size.y, size.z
-        )));
+        );
+        return Err(nowhere(&reason, "that the size is of this vehicle and in metres"));
     }
     let rotation = DMat3::from_rotation_z(-fit.axis) * upright;
     let center = fit.middle.extend(ground);

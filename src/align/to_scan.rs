@@ -39,6 +39,9 @@ const POINTS_SHARE: f64 = 1.0;
 /// vehicle, or not in metres: wrong headings miss by 2 and more, right ones by less than 1.
 const WORST_PX: f64 = 5.0;
 
+/// What to look at where no alignment fits.
+const CHECK: &str = "that the scan is of this vehicle and in metres";
+
 /// Least [`ScanAlignment::confidence`] for which front and back are told apart.
 pub const LEAST_CONFIDENCE: f64 = 0.1;
 
@@ -92,7 +95,7 @@ pub fn to_scan(views: &[View], sparse: &[DVec3], scan: &Cloud, heading: Heading)
         (s, silhouettes::misses(&outlines, &scan.points, &s, COMPARED_PX))
     };
     let first: Vec<(Similarity, f64)> = starts.into_iter().take(TRIED).map(tried).collect();
-    let best = best_of(first.iter().copied()).ok_or_else(|| nowhere("no start leads anywhere"))?;
+    let best = best_of(first.iter().copied()).ok_or_else(|| nowhere("no start leads anywhere", CHECK))?;
     // Whatever was found upright the other way round, and the best one exactly turned.
     let is_opposite = |s: &Similarity| {
         let turn = s.rotation * best.rotation.transpose();
@@ -107,10 +110,11 @@ pub fn to_scan(views: &[View], sparse: &[DVec3], scan: &Cloud, heading: Heading)
     let [(best, misses), (other, other_misses)] = both;
     let worst = WORST_PX * f64::from(views[0].camera.width) / 512.0;
     if !(misses.mean_px <= worst && misses.median_m.is_finite()) {
-        return Err(nowhere(&format!(
+        let reason = format!(
             "the scan's outline misses the masks' edges by {:.1} pixels on average, allowed: {worst:.1}",
             misses.mean_px
-        )));
+        );
+        return Err(nowhere(&reason, CHECK));
     }
     let contrary = is_contrary(heading, views, &best, scan.center)?;
     let (chosen, misses, other_misses) =

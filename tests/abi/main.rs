@@ -21,6 +21,7 @@
 
 mod abidiff;
 mod abixml;
+mod align;
 mod arguments;
 mod buffers;
 mod client;

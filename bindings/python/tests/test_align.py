@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pytest
 
 import vehicle_gaussians as vg
-from conftest import SEDAN
+from conftest import AXES, SEDAN, ellipsoid_view
 from vehicle_gaussians import Alignment, Status, capi
 
 FACES = [vg, capi]
@@ -92,6 +92,26 @@ def test_a_folder_is_read_and_aligned(tmp_path: Path, scan: npt.NDArray[np.float
     known = np.array(json.loads((SEDAN / "vehicle_from_world.json").read_text())["vehicle_from_world"]).reshape(4, 4)
     error = found[0].vehicle_from_world @ np.linalg.inv(known) - np.eye(4)
     assert np.abs(error[:3, :3]).max() < 0.02 and np.abs(error[:3, 3]).max() < 0.05
+
+
+def test_a_box_on_the_ground_tells_the_gauge_by_either_face() -> None:
+    angles = 2 * np.pi * (np.arange(16) + 0.3) / 16
+    ring = [(7 * np.cos(a), 7 * np.sin(a), 2.6 if i % 3 == 2 else 0.9) for i, a in enumerate(angles)]
+    views = [ellipsoid_view(center, 320, 240) for center in ring]
+    masks, cameras = [view[1] for view in views], in_world([view[3] for view in views])
+    around = np.random.default_rng(5).uniform(-6, 6, (600, 3))
+    around[:, 2] = -AXES[2] + around[:, 2] / 1000
+    ground = around @ WORLD_FROM_VEHICLE[:3, :3].T + WORLD_FROM_VEHICLE[:3, 3]
+    arguments = (masks, cameras, ground, 2 * AXES)
+    found = [face.align_box(*arguments, heading="forward") for face in FACES]
+    # As above.
+    assert np.allclose(*(one.vehicle_from_world for one in found), rtol=0, atol=1e-9)
+    assert found[0][1:4] == pytest.approx(found[1][1:4], rel=1e-9, abs=1e-9) and found[0][4:] == found[1][4:]
+    error = found[0].vehicle_from_world @ WORLD_FROM_VEHICLE - np.eye(4)
+    assert np.abs(error).max() < 0.1 and found[0].scale == pytest.approx(2, rel=0.05)
+    assert (found[0].residual_px, found[0].other_px, found[0].used_count) == (None, None, 16)
+    back = vg.align_box(*arguments, heading="backward")
+    assert back.vehicle_from_world[0, :3] @ found[0].vehicle_from_world[0, :3] < 0
 
 
 @pytest.mark.parametrize("face", FACES)

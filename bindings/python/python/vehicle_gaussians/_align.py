@@ -29,9 +29,10 @@ def align_scan(
     """The vehicle's frame by points scanned on the vehicle: their outline must run along the edges of all masks.
 
     masks: one for each camera, of which at least 3 are not None. cameras: with poses in the world, whose place,
-    direction and unit are anything. scan: float32 (n, 3), metres, vehicle frame. sparse: (n, 3), points of the world that
-    may show anything. heading: "auto", which refuses to guess where front and back fit as well; "forward": the first
-    view by name, of those not taken from abeam, was taken from ahead of the vehicle's middle; "backward": from behind.
+    direction and unit are anything. scan: float32 (n, 3), metres, vehicle frame. sparse: (n, 3), points of the world
+    that may show anything. heading: "auto", which refuses to guess where front and back fit as well; "forward": the
+    first view by name, of those not taken from abeam, was taken from ahead of the vehicle's middle; "backward": from
+    behind.
     names: of the views, for messages; "000", "001", ... if not given. threads: worker threads; 0 means one per core.
     """
     return Alignment(*_native.align_scan(masks, cameras, scan, sparse, heading, names, threads))
@@ -50,8 +51,8 @@ def align_box(
     """The vehicle's frame by its size and the ground; its origin is the box's middle.
 
     size: length, width and height, metres. sparse: points of the world, of which some show level ground around the
-    vehicle. heading: "forward" or "backward"; a box does not tell. The others are as for ``align_scan``, with masks from
-    all around.
+    vehicle. heading: "forward" or "backward"; a box does not tell. The others are as for ``align_scan``, with masks
+    from all around.
     """
     return Alignment(*_native.align_box(masks, cameras, sparse, size, heading, names, threads))
 
