@@ -145,6 +145,17 @@ fn the_cpu_renderer_agrees_with_gsplat() {
 }
 
 #[test]
+#[cfg(feature = "gpu")]
+fn the_gpu_renderer_agrees_with_gsplat() {
+    let Some(renderer) = common::gpu::renderer() else { return };
+    let failures = for_each_case("gpu", |npz, case, camera| {
+        let picture = renderer.render(&case.gaussians, camera, &case.options).unwrap();
+        picture_against_golden(npz, &case.suffix, &picture)
+    });
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+#[test]
 fn the_reference_agrees_with_gsplat_to_1e_6_or_to_its_rotations_rounding() {
     let failures = for_each_case("f64", |npz, case, camera| {
         let p = Reference.render_f64(&case.gaussians, camera, &case.options).unwrap();

@@ -69,9 +69,19 @@ impl LensMap {
         camera: &Camera,
         options: &RenderOptions,
     ) -> Result<Rendered> {
+        self.render_with(camera, options, |pinhole, fine| renderer.render(gaussians, pinhole, fine))
+    }
+
+    /// As [`LensMap::render`], where `draw` makes the pinhole picture.
+    pub(super) fn render_with(
+        &self,
+        camera: &Camera,
+        options: &RenderOptions,
+        draw: impl FnOnce(&Camera, &RenderOptions) -> Result<Rendered>,
+    ) -> Result<Rendered> {
         let (pinhole, fine) = self.pinhole(camera, options);
         let mut out = Rendered::default();
-        self.resample(&renderer.render(gaussians, &pinhole, &fine)?, options, &mut out);
+        self.resample(&draw(&pinhole, &fine)?, options, &mut out);
         Ok(out)
     }
 

@@ -2,13 +2,18 @@
 
 pub mod cpu;
 pub mod distorted;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod gradient;
 pub mod loss;
 pub mod options;
 pub mod output;
 pub mod reference;
+mod view;
 
 pub use cpu::CpuRenderer;
+#[cfg(feature = "gpu")]
+pub use gpu::{Adapter, GpuAsset, GpuRenderer};
 pub use gradient::{Differentiable, Gradients, PictureGradient, PoseGradient};
 pub use options::{Background, DepthMode, RenderOptions};
 pub use output::Rendered;

@@ -3,6 +3,8 @@
 
 pub mod boxes;
 pub mod golden;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod gradients;
 pub mod npz;
 pub mod sample;

@@ -14,12 +14,12 @@ mod simd;
 mod sort;
 mod splat;
 mod tile;
-mod view;
 
 use crate::error::Result;
 use crate::gaussians::Gaussians;
 use crate::geometry::Camera;
 use crate::render::distorted::LensMap;
+use crate::render::view::PinholeView;
 use crate::render::{RenderOptions, Rendered, Renderer};
 use backward::BackwardScratch;
 pub use backward::BackwardTimes;
@@ -32,7 +32,6 @@ use splat::{PixelBounds, Splat};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tile::{Planes, TILE_HEIGHT, TILE_WIDTH, Tile};
-use view::PinholeView;
 
 /// Gaussians projected by one task: large enough to hide its cost, small enough to keep threads evenly busy.
 const PROJECT_CHUNK: usize = 2048;

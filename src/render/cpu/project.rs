@@ -8,9 +8,9 @@
 
 use super::color;
 use super::splat::{PixelBounds, Splat};
-use super::view::PinholeView;
 use crate::gaussians::{Gaussians, sh};
 use crate::render::options::{ALPHA_THRESHOLD, MIN_COMPENSATION};
+use crate::render::view::PinholeView;
 use std::ops::Range;
 
 /// Sort key of a Gaussian that is not drawn; larger than the bits of any depth.

@@ -20,12 +20,12 @@
 use super::super::color;
 use super::super::project::{Inputs, LANES, Placed, dot, placed};
 use super::super::splat::Splat;
-use super::super::view::PinholeView;
 use super::blend::SplatSums;
 use super::color::backward as color_backward;
 use crate::gaussians::{self, Gaussians};
 use crate::render::gradient::narrow;
 use crate::render::options::MIN_COMPENSATION;
+use crate::render::view::PinholeView;
 
 /// The camera's part: dL/dR at a fixed centre `[3][3]` row by row, dL/dp `[3]` summed over Gaussians, dL/d(centre)
 /// through the directions of colour `[3]`, vehicle frame.

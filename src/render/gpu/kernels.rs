@@ -1,0 +1,58 @@
+//! The stages as compiled programs, made once per device.
+
+use super::device::Device;
+
+/// Compute pipelines; the shaders are beside this file.
+#[derive(Debug)]
+pub(super) struct Kernels {
+    pub(super) project: wgpu::ComputePipeline,
+    pub(super) scan: wgpu::ComputePipeline,
+    pub(super) scan_add: wgpu::ComputePipeline,
+    pub(super) sort_count: wgpu::ComputePipeline,
+    pub(super) sort_scatter: wgpu::ComputePipeline,
+    pub(super) cover: wgpu::ComputePipeline,
+    pub(super) emit: wgpu::ComputePipeline,
+    pub(super) find_ranges: wgpu::ComputePipeline,
+    pub(super) blend: wgpu::ComputePipeline,
+}
+
+/// What several shaders begin with.
+const FRAME: &str = include_str!("shaders/frame.wgsl");
+
+impl Kernels {
+    pub(super) fn new(device: &Device) -> Self {
+        let module = |name: &str, source: &str| {
+            let source = wgpu::ShaderSource::Wgsl(format!("{FRAME}\n{source}").into());
+            device.device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(name), source })
+        };
+        let pipeline = |module: &wgpu::ShaderModule, entry_point: &str| {
+            device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(entry_point),
+                // Deduced: a stage's bindings stand in its shader and nowhere else.
+                layout: None,
+                module,
+                entry_point: Some(entry_point),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    // Each kernel writes its own before it reads it.
+                    zero_initialize_workgroup_memory: false,
+                    ..wgpu::PipelineCompilationOptions::default()
+                },
+                cache: None,
+            })
+        };
+        let scan = module("scan", include_str!("shaders/scan.wgsl"));
+        let sort = module("sort", include_str!("shaders/sort.wgsl"));
+        let tiles = module("tiles", include_str!("shaders/tiles.wgsl"));
+        Self {
+            project: pipeline(&module("project", include_str!("shaders/project.wgsl")), "project"),
+            scan: pipeline(&scan, "scan"),
+            scan_add: pipeline(&scan, "add"),
+            sort_count: pipeline(&sort, "count"),
+            sort_scatter: pipeline(&sort, "scatter"),
+            cover: pipeline(&tiles, "cover"),
+            emit: pipeline(&tiles, "emit"),
+            find_ranges: pipeline(&module("ranges", include_str!("shaders/ranges.wgsl")), "find"),
+            blend: pipeline(&module("blend", include_str!("shaders/blend.wgsl")), "blend"),
+        }
+    }
+}

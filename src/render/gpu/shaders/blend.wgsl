@@ -1,0 +1,124 @@
+// Front-to-back blending of one tile, a pixel a thread.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> ranges: array<vec2<u32>>;
+// Pairs by tile, nearest first.
+@group(0) @binding(2) var<storage, read> pairs: array<u32>;
+@group(0) @binding(3) var<storage, read> pair_splats: array<u32>;
+@group(0) @binding(4) var<storage, read> splats: array<Splat>;
+@group(0) @binding(5) var<storage, read> tints: array<vec4<f32>>;
+// The band's planes: colour [pixels][3], alpha [pixels], depth [pixels]. Between slices the plane of alpha holds the
+// transmittance, negative where the pixel is finished.
+@group(0) @binding(6) var<storage, read_write> picture: array<f32>;
+// Whether a pixel is not finished.
+@group(0) @binding(7) var<storage, read_write> unfinished: array<atomic<u32>>;
+
+const PIXELS: u32 = TILE * TILE;
+
+var<workgroup> batch: array<Splat, PIXELS>;
+var<workgroup> batch_tints: array<vec4<f32>, PIXELS>;
+var<workgroup> live: atomic<u32>;
+var<workgroup> is_live: u32;
+
+// 2^x for x <= 0: 2^round(x) times a polynomial in the rest, at most 2 units of the last place from it. The
+// built-in's error grows with x.
+fn exp2_of(x: f32) -> f32 {
+    let y = max(x, -100.0);
+    let n = round(y);
+    let f = y - n;
+    var p = 1.5453163e-4;
+    p = p * f + 1.3390863e-3;
+    p = p * f + 9.618083e-3;
+    p = p * f + 5.550357e-2;
+    p = p * f + 0.2402265;
+    p = p * f + 0.6931472;
+    p = p * f + 1.0;
+    return p * bitcast<f32>(u32(i32(n) + 127) << 23u);
+}
+
+@compute @workgroup_size(PIXELS)
+fn blend(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let x = group.x * TILE + lane % TILE;
+    let row = group.y * TILE + lane / TILE;
+    let y = frame.first_tile_row * TILE + row;
+    let is_inside = x < frame.width && y < frame.height;
+    let pixels = frame.width * min(frame.tile_rows * TILE, frame.height - frame.first_tile_row * TILE);
+    let pixel = row * frame.width + x;
+
+    // Negative: finished.
+    var t = select(-1.0, 1.0, is_inside);
+    var color = vec3(0.0);
+    var depth = 0.0;
+    if (frame.is_first == 0u && is_inside) {
+        color = vec3(picture[3u * pixel], picture[3u * pixel + 1u], picture[3u * pixel + 2u]);
+        t = picture[3u * pixels + pixel];
+        depth = picture[4u * pixels + pixel];
+    }
+    let center = vec2(f32(x), f32(y)) + 0.5;
+
+    let range = ranges[group.y * frame.tile_columns + group.x];
+    for (var begin = range.x; begin < range.y; begin += PIXELS) {
+        if (lane == 0u) {
+            atomicStore(&live, 0u);
+        }
+        workgroupBarrier();
+        if (t > 0.0) {
+            atomicStore(&live, 1u);
+        }
+        workgroupBarrier();
+        if (lane == 0u) {
+            is_live = atomicLoad(&live);
+        }
+        if (workgroupUniformLoad(&is_live) == 0u) {
+            break;
+        }
+        let count = min(range.y - begin, PIXELS);
+        if (lane < count) {
+            let splat = pair_splats[pairs[begin + lane]];
+            batch[lane] = splats[splat];
+            batch_tints[lane] = tints[splat];
+        }
+        workgroupBarrier();
+        for (var k = 0u; k < count && t > 0.0; k++) {
+            let s = batch[k];
+            let dx = (center.x - center_x(s)) - s.rest_x;
+            let dy = (center.y - center_y(s)) - s.rest_y;
+            let is_pivot_x = s.conditional < 0.0;
+            let along = select(dy, dx, is_pivot_x);
+            let across = select(dx, dy, is_pivot_x) - s.slope * along;
+            let q = abs(s.conditional) * (across * across) + s.marginal * (along * along);
+            let alpha = min(s.opacity * exp2_of(-q), frame.max_alpha);
+            if (alpha >= ALPHA_THRESHOLD) {
+                let next = t * (1.0 - alpha);
+                if (next > TRANSMITTANCE_THRESHOLD) {
+                    // What t lost: that sums up to the 1 - t by which depth is divided.
+                    let weight = t - next;
+                    color += weight * batch_tints[k].xyz;
+                    depth += weight * batch_tints[k].w;
+                    t = next;
+                } else {
+                    t = -t;
+                }
+            }
+        }
+    }
+    if (!is_inside) {
+        return;
+    }
+    if (frame.is_last != 0u) {
+        let rest = abs(t);
+        let alpha = 1.0 - rest;
+        color += rest * frame.background.xyz;
+        if (frame.expected_depth != 0u) {
+            depth = select(0.0, depth / max(alpha, 1e-30), alpha > 0.0);
+        }
+        t = alpha;
+    } else if (t > 0.0) {
+        atomicStore(&unfinished[0], 1u);
+    }
+    picture[3u * pixel] = color.x;
+    picture[3u * pixel + 1u] = color.y;
+    picture[3u * pixel + 2u] = color.z;
+    picture[3u * pixels + pixel] = t;
+    picture[4u * pixels + pixel] = depth;
+}

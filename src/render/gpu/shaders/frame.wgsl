@@ -1,0 +1,79 @@
+// What every stage knows of the picture, the arithmetic they share, and a projected Gaussian.
+
+struct Frame {
+    // Rows of camera_from_vehicle's rotation; what f32 leaves of each number comes after.
+    rotation: array<vec4<f32>, 3>,
+    rotation_rest: array<vec4<f32>, 3>,
+    // The camera's centre, vehicle frame, metres.
+    center: vec4<f32>,
+    center_rest: vec4<f32>,
+    // fx, its rest, fy, its rest; then cx and cy likewise.
+    focal: vec4<f32>,
+    principal: vec4<f32>,
+    // Range of x/z, then of y/z, in which the Jacobian is taken.
+    jacobian_range: vec4<f32>,
+    background: vec4<f32>,
+    // Pixels of the picture.
+    width: u32,
+    height: u32,
+    near: f32,
+    far: f32,
+    blur: f32,
+    max_alpha: f32,
+    // Of all Gaussians.
+    count: u32,
+    // Floats of colour that a Gaussian has, and how many coefficients of each channel are looked at.
+    sh_stride: u32,
+    sh_coefficients: u32,
+    antialiased: u32,
+    expected_depth: u32,
+    // Always 0, which compilers cannot know: see `opaque`.
+    nothing: u32,
+    // The band of the picture at hand, in tiles.
+    tile_columns: u32,
+    first_tile_row: u32,
+    tile_rows: u32,
+    // Rank in depth at which the slice begins, and how many (tile, splat) pairs it may have.
+    slice_start: u32,
+    pair_capacity: u32,
+    // Whether the slice is the first of the band, and the last.
+    is_first: u32,
+    is_last: u32,
+    // Bits of the smallest depth that can occur.
+    first_key: u32,
+}
+
+// 32 bytes. The exponent of a splat is, in base 2 with (dx, dy) from its centre to a pixel's centre,
+//   pivot Y (conditional > 0):  q = conditional (dx - slope dy)^2 + marginal dy^2
+//   pivot X (conditional < 0):  q = |conditional| (dy - slope dx)^2 + marginal dx^2
+// Cholesky's form of the blurred covariance with the larger diagonal as pivot.
+struct Splat {
+    // Centre in pixels, rounded and cut to 16 bits each ...
+    center: u32,
+    // ... and what that leaves.
+    rest_x: f32,
+    rest_y: f32,
+    slope: f32,
+    conditional: f32,
+    marginal: f32,
+    opacity: f32,
+    // Not less than log2(255 opacity): where q exceeds this, alpha is below 1/255.
+    q_max: f32,
+}
+
+const TILE: u32 = 8u;
+const NOT_DRAWN: u32 = 0xffffffffu;
+const ALPHA_THRESHOLD: f32 = 1.0 / 255.0;
+const TRANSMITTANCE_THRESHOLD: f32 = 1e-4;
+const MIN_COMPENSATION: f32 = 0.005;
+const HALF_LOG2_E: f32 = 0.72134752;
+// Lengths in pixels are cut here, so that their squares stay in f32.
+const MAX_PIXELS: f32 = 1e15;
+
+fn center_x(s: Splat) -> f32 {
+    return f32(bitcast<i32>(s.center << 16u) >> 16u);
+}
+
+fn center_y(s: Splat) -> f32 {
+    return f32(bitcast<i32>(s.center) >> 16u);
+}

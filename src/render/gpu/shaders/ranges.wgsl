@@ -1,0 +1,22 @@
+// Where each tile's pairs begin and end, once they are sorted by tile.
+
+@group(0) @binding(0) var<storage, read> counter: array<u32>;
+@group(0) @binding(1) var<storage, read> pair_tiles: array<u32>;
+// [tiles]: begin, end; zero before.
+@group(0) @binding(2) var<storage, read_write> ranges: array<vec2<u32>>;
+
+@compute @workgroup_size(256)
+fn find(@builtin(global_invocation_id) id: vec3<u32>) {
+    let i = id.x;
+    let count = min(counter[0], arrayLength(&pair_tiles));
+    if (i >= count) {
+        return;
+    }
+    let tile = pair_tiles[i];
+    if (i == 0u || pair_tiles[i - 1u] != tile) {
+        ranges[tile].x = i;
+    }
+    if (i + 1u == count || pair_tiles[i + 1u] != tile) {
+        ranges[tile].y = i + 1u;
+    }
+}

@@ -1,0 +1,139 @@
+// Which tiles a splat touches: the exact ellipse where alpha reaches 1/255, a row of tiles at a time.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+// How many splats are drawn.
+@group(0) @binding(1) var<storage, read> counter: array<u32>;
+// Splats in order of depth.
+@group(0) @binding(2) var<storage, read> order: array<u32>;
+@group(0) @binding(3) var<storage, read> splats: array<Splat>;
+// By rank in depth: how many pairs a splat has, then where they begin.
+@group(0) @binding(4) var<storage, read_write> offsets: array<u32>;
+// Tile of each pair, in order of depth.
+@group(0) @binding(5) var<storage, read_write> pair_tiles: array<u32>;
+@group(0) @binding(6) var<storage, read_write> pair_splats: array<u32>;
+// The rank that did not fit, or none.
+@group(0) @binding(7) var<storage, read_write> slice_end: array<u32>;
+
+struct Ellipse {
+    center: vec2<f32>,
+    // In x: q = (dx - slope dy)^2 / inverse_column + row dy^2.
+    slope: f32,
+    inverse_column: f32,
+    row: f32,
+    q_max: f32,
+    reach_y: f32,
+    // dy where the ellipse is farthest right; farthest left at its negative.
+    right: f32,
+}
+
+fn ellipse(s: Splat) -> Ellipse {
+    let c = abs(s.conditional);
+    var e: Ellipse;
+    e.center = vec2(center_x(s) + s.rest_x, center_y(s) + s.rest_y);
+    e.q_max = s.q_max;
+    let along = sqrt(s.q_max / s.marginal);
+    let across = sqrt(s.q_max * (s.slope * s.slope / s.marginal + 1.0 / c));
+    let column = c * s.slope * s.slope + s.marginal;
+    if (s.conditional > 0.0) {
+        e.slope = s.slope;
+        e.inverse_column = 1.0 / c;
+        e.row = s.marginal;
+        e.reach_y = along;
+        e.right = c * s.slope / column * across;
+    } else {
+        e.slope = c * s.slope / column;
+        e.inverse_column = 1.0 / column;
+        e.row = c / column * s.marginal;
+        e.reach_y = across;
+        e.right = s.slope * along;
+    }
+    return e;
+}
+
+// First and last of the pixels 0..count whose centres lie in [low, high], as tiles, first > last where there is none.
+// Rounding of what led here, generously: what it lets in is cut at alpha < 1/255.
+fn tiles_between(low: f32, high: f32, count: u32) -> vec2<i32> {
+    let slack = 0.01 + 2e-6 * max(abs(low), abs(high));
+    let last = f32(count) - 1.0;
+    let first_pixel = ceil(max(low - slack - 0.5, 0.0));
+    let last_pixel = floor(min(high + slack - 0.5, last));
+    if (!(first_pixel <= last_pixel)) {
+        return vec2(1, 0);
+    }
+    return vec2<i32>(vec2(first_pixel, last_pixel)) / i32(TILE);
+}
+
+// Rows of tiles in the band.
+fn rows(e: Ellipse) -> vec2<i32> {
+    let rows = tiles_between(e.center.y - e.reach_y, e.center.y + e.reach_y, frame.height);
+    let first = i32(frame.first_tile_row);
+    return vec2(max(rows.x, first), min(rows.y, first + i32(frame.tile_rows) - 1));
+}
+
+// Columns of tiles in one row of them.
+fn columns(e: Ellipse, row: i32) -> vec2<i32> {
+    let top = f32(row * i32(TILE)) + 0.5 - e.center.y;
+    let low = clamp(top, -e.reach_y, e.reach_y);
+    let high = clamp(top + f32(TILE - 1u), -e.reach_y, e.reach_y);
+    let right = clamp(e.right, low, high);
+    let left = clamp(-e.right, low, high);
+    let half_right = sqrt(max(e.q_max - e.row * right * right, 0.0) * e.inverse_column);
+    let half_left = sqrt(max(e.q_max - e.row * left * left, 0.0) * e.inverse_column);
+    let from_x = e.center.x + e.slope * left - half_left;
+    let to_x = e.center.x + e.slope * right + half_right;
+    return tiles_between(from_x, to_x, frame.width);
+}
+
+@compute @workgroup_size(256)
+fn cover(@builtin(global_invocation_id) id: vec3<u32>) {
+    let rank = id.x;
+    // At least one more than there are splats: the running sum puts the total there.
+    if (rank >= arrayLength(&offsets)) {
+        return;
+    }
+    var pairs = 0u;
+    if (rank >= frame.slice_start && rank < counter[0]) {
+        let e = ellipse(splats[order[rank]]);
+        let r = rows(e);
+        for (var row = r.x; row <= r.y; row++) {
+            let c = columns(e, row);
+            pairs += u32(c.y - c.x + 1);
+        }
+    }
+    offsets[rank] = pairs;
+}
+
+@compute @workgroup_size(256)
+fn emit(@builtin(global_invocation_id) id: vec3<u32>) {
+    let rank = id.x;
+    if (rank < frame.slice_start || rank >= counter[0]) {
+        return;
+    }
+    let begin = offsets[rank];
+    let end = offsets[rank + 1u];
+    if (begin == end || begin > frame.pair_capacity) {
+        return;
+    }
+    var at = begin;
+    if (end <= frame.pair_capacity) {
+        let splat = order[rank];
+        let e = ellipse(splats[splat]);
+        let r = rows(e);
+        for (var row = r.x; row <= r.y; row++) {
+            let c = columns(e, row);
+            let first = (row - i32(frame.first_tile_row)) * i32(frame.tile_columns);
+            for (var column = c.x; column <= c.y && at < end; column++) {
+                pair_tiles[at] = u32(first + column);
+                pair_splats[at] = splat;
+                at++;
+            }
+        }
+    } else {
+        slice_end[0] = rank;
+    }
+    // Nothing is left undefined: not where the slice ends, and not if two kernels should round differently.
+    let last = min(end, frame.pair_capacity);
+    for (; at < last; at++) {
+        pair_tiles[at] = NOT_DRAWN;
+    }
+}

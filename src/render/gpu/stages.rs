@@ -1,0 +1,204 @@
+//! The stages of a picture as commands for the device.
+
+use super::asset::GpuAsset;
+use super::device::Device;
+use super::frame::Frame;
+use super::kernels::Kernels;
+use super::memory::{Counters, DIGIT_BITS, Entries, PIXEL, PerBand, PerGaussian, PerPair, Sums};
+
+/// Commands on their way to the device.
+pub(super) struct Stages<'a> {
+    device: &'a Device,
+    kernels: &'a Kernels,
+    encoder: wgpu::CommandEncoder,
+    /// Open while kernels follow each other; copies end it.
+    pass: Option<wgpu::ComputePass<'static>>,
+}
+
+/// What a kernel is given: the binding's number in its shader, and the buffer.
+type Binding<'b> = (u32, &'b wgpu::Buffer);
+
+/// Bits in which numbers below `count` differ.
+pub(super) fn bits_of(count: u32) -> u32 {
+    u32::BITS - count.saturating_sub(1).leading_zeros()
+}
+
+/// Passes that sort so many bits: one at least, which leaves out what is not drawn.
+fn passes(bits: u32) -> usize {
+    bits.div_ceil(DIGIT_BITS).max(1) as usize
+}
+
+/// The sorted values: each pass goes from one buffer to the other.
+fn sorted(entries: &Entries, bits: u32) -> &wgpu::Buffer {
+    &entries.values[passes(bits) % 2]
+}
+
+impl<'a> Stages<'a> {
+    pub(super) fn new(device: &'a Device, kernels: &'a Kernels) -> Self {
+        let encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        Self { device, kernels, encoder, pass: None }
+    }
+
+    /// Splats of the Gaussians, with the distance of their depth's bits from the smallest as keys.
+    pub(super) fn project(&mut self, asset: &GpuAsset, counters: &Counters, per: &PerGaussian) {
+        for chunk in &asset.chunks {
+            let bindings = [
+                (0, &counters.frame),
+                (1, &chunk.range),
+                (2, &chunk.shapes),
+                (3, &chunk.colors),
+                (4, &per.splats),
+                (5, &per.tints),
+                (6, &per.depths.keys[0]),
+            ];
+            self.run(&self.kernels.project, &bindings, [chunk.count.div_ceil(64) as u32, 1]);
+        }
+    }
+
+    /// The numbers of the splats that are drawn, in order of depth, of which so many bits differ.
+    pub(super) fn sort_by_depth(&mut self, counters: &Counters, per: &PerGaussian, bits: u32) {
+        self.sort(&per.depths, &counters.gaussians, bits);
+    }
+
+    /// (tile, splat) pairs of the band in order of depth, from the slice's first splat on, as many as there is room for.
+    pub(super) fn list_pairs(
+        &mut self,
+        counters: &Counters,
+        per: &PerGaussian,
+        pair: &PerPair,
+        depth_bits: u32,
+    ) {
+        let order = sorted(&per.depths, depth_bits);
+        let drawn = per.depths.histogram.total();
+        let bindings = [
+            (0, &counters.frame),
+            (1, drawn),
+            (2, order),
+            (3, &per.splats),
+            (4, &per.offsets.values),
+            (5, &pair.tiles.keys[0]),
+            (6, &pair.splats),
+            (7, &counters.slice_end),
+        ];
+        let ranks = per.offsets.values.size() / 4;
+        let groups = [ranks.div_ceil(256) as u32, 1];
+        self.run(&self.kernels.cover, &bindings[..5], groups);
+        self.sum(&per.offsets);
+        self.run(&self.kernels.emit, &bindings, groups);
+    }
+
+    /// The pairs by tile, nearest first, and where each tile's begin.
+    pub(super) fn sort_by_tile(&mut self, per: &PerGaussian, pair: &PerPair, band: &PerBand, bits: u32) {
+        self.sort(&pair.tiles, per.offsets.total(), bits);
+        self.close();
+        self.encoder.clear_buffer(&band.ranges, 0, None);
+        let tiles = &pair.tiles.keys[passes(bits) % 2];
+        let bindings = [(0, pair.tiles.histogram.total()), (1, tiles), (2, &band.ranges)];
+        self.run(&self.kernels.find_ranges, &bindings, [pair.tiles.capacity.div_ceil(256) as u32, 1]);
+    }
+
+    /// Blends the band's tiles.
+    pub(super) fn blend(
+        &mut self,
+        frame: &Frame,
+        counters: &Counters,
+        per: &PerGaussian,
+        pair: &PerPair,
+        band: &PerBand,
+        tile_bits: u32,
+    ) {
+        let bindings = [
+            (0, &counters.frame),
+            (1, &band.ranges),
+            (2, sorted(&pair.tiles, tile_bits)),
+            (3, &pair.splats),
+            (4, &per.splats),
+            (5, &per.tints),
+            (6, &band.picture),
+            (7, &counters.unfinished),
+        ];
+        self.run(&self.kernels.blend, &bindings, [frame.tile_columns, frame.tile_rows]);
+    }
+
+    /// Makes ready for the processor how the slice went and, where it was the last, the band's `pixels`.
+    pub(super) fn read_back(
+        &mut self,
+        counters: &Counters,
+        per: &PerGaussian,
+        band: &PerBand,
+        pixels: Option<u64>,
+    ) {
+        self.close();
+        let numbers = [per.offsets.total(), &counters.slice_end, &counters.unfinished];
+        for (i, from) in numbers.into_iter().enumerate() {
+            self.encoder.copy_buffer_to_buffer(from, 0, &counters.readback, 4 * i as u64, 4);
+        }
+        if let Some(pixels) = pixels {
+            self.encoder.copy_buffer_to_buffer(&band.picture, 0, &band.readback, 0, PIXEL * pixels);
+        }
+    }
+
+    /// Hands everything to the device.
+    pub(super) fn submit(mut self) {
+        self.close();
+        self.device.queue.submit([self.encoder.finish()]);
+    }
+
+    /// `entries` by the lowest `bits` of their keys, stably; the first pass leaves out what is not drawn.
+    fn sort(&mut self, entries: &Entries, count: &wgpu::Buffer, bits: u32) {
+        let groups = [entries.histogram.values.size() as u32 / 64, 1];
+        let remaining = entries.histogram.total();
+        for i in 0..passes(bits) {
+            let (from, to) = (i % 2, (i + 1) % 2);
+            let bindings = [
+                (0, &entries.passes[i]),
+                (1, if i == 0 { count } else { remaining }),
+                (2, &entries.keys[from]),
+                (3, &entries.histogram.values),
+                (4, &entries.values[from]),
+                (5, &entries.keys[to]),
+                (6, &entries.values[to]),
+            ];
+            self.run(&self.kernels.sort_count, &bindings[..4], groups);
+            self.sum(&entries.histogram);
+            self.run(&self.kernels.sort_scatter, &bindings, groups);
+        }
+    }
+
+    /// The sums of what lies before each of `sums`' values, in their place.
+    fn sum(&mut self, sums: &Sums) {
+        let levels: Vec<&wgpu::Buffer> = std::iter::once(&sums.values).chain(&sums.levels).collect();
+        let blocks = |level: usize| [(levels[level + 1].size() / 4) as u32, 1];
+        for level in 0..levels.len() - 1 {
+            self.run(&self.kernels.scan, &[(0, levels[level]), (1, levels[level + 1])], blocks(level));
+        }
+        for level in (0..levels.len() - 2).rev() {
+            self.run(&self.kernels.scan_add, &[(0, levels[level]), (1, levels[level + 1])], blocks(level));
+        }
+    }
+
+    fn run(&mut self, kernel: &wgpu::ComputePipeline, bindings: &[Binding], groups: [u32; 2]) {
+        let entries: Vec<wgpu::BindGroupEntry> = bindings
+            .iter()
+            .map(|(binding, buffer)| wgpu::BindGroupEntry {
+                binding: *binding,
+                resource: buffer.as_entire_binding(),
+            })
+            .collect();
+        let group = self.device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &kernel.get_bind_group_layout(0),
+            entries: &entries,
+        });
+        let pass = self.pass.get_or_insert_with(|| {
+            self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()).forget_lifetime()
+        });
+        pass.set_pipeline(kernel);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(groups[0], groups[1], 1);
+    }
+
+    fn close(&mut self) {
+        self.pass = None;
+    }
+}

@@ -1,0 +1,310 @@
+//! The renderer on a graphics processor against the f64 reference and the CPU's, and what may go wrong with a device.
+
+mod common;
+
+use common::gpu::renderer;
+use common::scenes::{looking_at_origin, random, surfel_car};
+use common::{compare, is_finite};
+use glam::{DMat3, DVec3};
+use vg::geometry::Distortion;
+use vg::geometry::camera::Intrinsics;
+use vg::render::{
+    Adapter, Background, CpuRenderer, DepthMode, GpuRenderer, Reference, RenderOptions, Rendered, Renderer,
+};
+use vg::{Camera, Gaussians, Pose};
+
+const UNIT: [f32; 4] = [1.0, 0.0, 0.0, 0.0];
+
+fn options() -> RenderOptions {
+    RenderOptions { background: Background::Color([0.1, 0.2, 0.3]), ..RenderOptions::default() }
+}
+
+/// A camera at the origin that looks along +x of the vehicle, z up.
+fn forward(width: u32, height: u32, focal: f64) -> Camera {
+    let rotation = DMat3::from_cols(DVec3::NEG_Y, DVec3::NEG_Z, DVec3::X);
+    let (cx, cy) = (0.5 * f64::from(width), 0.5 * f64::from(height));
+    let intrinsics = Intrinsics { fx: focal, fy: focal, cx, cy };
+    Camera::pinhole(width, height, intrinsics, Pose { rotation, translation: DVec3::ZERO }).unwrap()
+}
+
+/// `n` walls before the camera, a millimetre apart.
+fn walls(n: usize, opacity: f32, size: f32) -> Gaussians {
+    let means = (0..n).map(|i| [5.0 + i as f32 * 1e-3, 0.0, 0.0]).collect();
+    let sh = vec![0.5; 3 * n];
+    Gaussians::from_arrays(0, means, vec![UNIT; n], vec![[size; 3]; n], vec![opacity; n], sh).unwrap()
+}
+
+fn assert_close(name: &str, a: &Rendered, b: &Rendered, mean: f64, max: f64) {
+    for (plane, d) in ["colour", "alpha", "depth"].into_iter().zip(compare(a, b)) {
+        println!("{name:40} {plane:7} mean {:.1e}, 99.9 % {:.1e}, max {:.1e}", d.mean, d.p999, d.max);
+        assert!(d.mean <= mean && d.max <= max, "{name}: {plane} {d:?}");
+    }
+}
+
+#[test]
+fn it_agrees_with_the_reference_on_random_and_stiff_scenes() {
+    let Some(gpu) = renderer() else { return };
+    let side = looking_at_origin(203, 117, DVec3::new(0.4, -1.0, 0.3), 7.0);
+    let mut off_center = side;
+    (off_center.intrinsics.cx, off_center.intrinsics.cy) = (40.0, 90.5);
+    let near = looking_at_origin(160, 120, DVec3::new(1.0, 0.2, 0.1), 1.5);
+    let mut far_away = side;
+    far_away.vehicle_from_camera.translation *= 1e5;
+    (far_away.intrinsics.fx, far_away.intrinsics.fy) = (1e5 * side.intrinsics.fx, 1e5 * side.intrinsics.fy);
+    let scenes = [
+        ("surfels of 2 cm", random(1, 3000, 3, [0.005, 0.02]), side),
+        ("blobs of 30 cm", random(2, 300, 2, [0.02, 0.3]), side),
+        ("needles, axis ratio up to 1e6", random(3, 300, 1, [1e-6, 1.0]), side),
+        ("principal point off centre", random(4, 1000, 3, [0.005, 0.1]), off_center),
+        ("camera among the Gaussians", random(5, 1000, 3, [0.005, 0.1]), near),
+        ("camera 700 km away", random(1, 1000, 3, [0.005, 0.05]), far_away),
+        ("one pixel", random(6, 500, 3, [0.01, 0.1]), looking_at_origin(1, 1, DVec3::X, 7.0)),
+        ("one row", random(7, 500, 3, [0.01, 0.1]), looking_at_origin(300, 1, DVec3::X, 7.0)),
+        ("one column", random(7, 500, 3, [0.01, 0.1]), looking_at_origin(1, 300, DVec3::X, 7.0)),
+        ("no Gaussians", Gaussians::default(), side),
+    ];
+    for (name, gaussians, camera) in scenes {
+        for antialiased in [false, true] {
+            let options = RenderOptions { antialiased, depth_mode: DepthMode::Accumulated, ..options() };
+            let found = gpu.render(&gaussians, &camera, &options).unwrap();
+            let exact = Reference.render(&gaussians, &camera, &options).unwrap();
+            // Depth is in metres, of which the last has a million.
+            let scale = camera.center().length().max(10.0) / 10.0;
+            let [color, alpha, depth] = compare(&found, &exact);
+            println!("{name:40} {color:?} {alpha:?} {depth:?}");
+            for d in [color, alpha] {
+                assert!(d.mean <= 2e-6 && d.max <= 5e-5, "{name}: {d:?}");
+            }
+            assert!(depth.mean <= 2e-6 * scale && depth.max <= 5e-4 * scale, "{name}: {depth:?}");
+        }
+    }
+}
+
+#[test]
+fn every_option_agrees_with_the_reference() {
+    let Some(gpu) = renderer() else { return };
+    let gaussians = random(8, 1500, 3, [0.005, 0.1]);
+    let camera = looking_at_origin(120, 90, DVec3::new(-1.0, 0.7, 0.4), 6.0);
+    let standard = RenderOptions { depth_mode: DepthMode::Accumulated, ..options() };
+    let variants = [
+        RenderOptions { sh_degree: 0, ..standard },
+        RenderOptions { sh_degree: 1, ..standard },
+        RenderOptions { sh_degree: 2, ..standard },
+        RenderOptions { blur: 0.1, max_alpha: 0.999, ..standard },
+        RenderOptions { near: 5.8, far: 6.5, ..standard },
+        RenderOptions { background: Background::Transparent, ..standard },
+        RenderOptions { depth_mode: DepthMode::Expected, ..standard },
+    ];
+    for options in variants {
+        let found = gpu.render(&gaussians, &camera, &options).unwrap();
+        let exact = Reference.render(&gaussians, &camera, &options).unwrap();
+        let [color, alpha, depth] = compare(&found, &exact);
+        assert!(color.max <= 5e-5 && alpha.max <= 5e-5, "{options:?}: {color:?} {alpha:?}");
+        assert!(depth.mean <= 1e-5 && depth.max <= 2e-3, "{options:?}: {depth:?}");
+    }
+}
+
+#[test]
+fn through_a_lens_it_draws_what_the_cpu_does() {
+    let Some(gpu) = renderer() else { return };
+    let gaussians = random(9, 2000, 2, [0.01, 0.1]);
+    let distortion = Distortion::Brown { k: [-0.1, 0.03, 0.0, 0.0, 0.0, 0.0], p: [0.01, -0.02] };
+    let camera = Camera { distortion, ..looking_at_origin(160, 120, DVec3::new(0.3, -1.0, 0.2), 6.0) };
+    let asset = gpu.upload(&gaussians).unwrap();
+    let expected = CpuRenderer::new().render(&gaussians, &camera, &options()).unwrap();
+    for _ in 0..2 {
+        let found = gpu.render_asset(&asset, &camera, &options()).unwrap();
+        let [color, alpha, depth] = compare(&found, &expected);
+        assert!(color.mean < 1e-6 && color.max < 1e-4, "{color:?}");
+        assert!(alpha.max < 1e-4 && depth.mean < 1e-4, "{alpha:?} {depth:?}");
+    }
+}
+
+#[test]
+fn depths_are_in_order_among_150_000_and_equal_ones_in_the_order_of_storage() {
+    let Some(gpu) = renderer() else { return };
+    // More than one block of the sort, than one level of the sums; a third of them equal, and not in order.
+    let car = surfel_car(150_000);
+    let camera = looking_at_origin(256, 192, DVec3::new(0.4, -1.0, 0.3), 7.0);
+    let expected = CpuRenderer::new().render(&car, &camera, &options()).unwrap();
+    let found = gpu.render(&car, &camera, &options()).unwrap();
+    let [color, alpha, depth] = compare(&found, &expected);
+    println!("{color:?} {alpha:?} {depth:?}");
+    assert!(color.mean < 1e-6 && color.p999 < 1e-5 && color.max < 4e-3, "{color:?}");
+    assert!(alpha.max < 4e-3 && depth.mean < 1e-5, "{alpha:?} {depth:?}");
+
+    let n = 5000;
+    let mut sh = vec![0.0; 3 * n];
+    sh[0] = 1.0;
+    let means = vec![[3.0, 0.0, 0.0]; n];
+    let g = Gaussians::from_arrays(0, means, vec![UNIT; n], vec![[0.05; 3]; n], vec![0.9; n], sh).unwrap();
+    let camera = forward(33, 33, 40.0);
+    let expected = Reference.render(&g, &camera, &options()).unwrap();
+    assert_close("equal depths", &gpu.render(&g, &camera, &options()).unwrap(), &expected, 1e-5, 1e-4);
+}
+
+#[test]
+fn bands_slices_chunks_and_repetition_change_no_byte() {
+    let Some(gpu) = renderer() else { return };
+    let mut gaussians = random(10, 4000, 3, [0.005, 0.2]);
+    gaussians.append(&random(11, 60, 3, [1.0, 3.0]));
+    let camera = looking_at_origin(200, 150, DVec3::new(0.4, -1.0, 0.3), 5.0);
+    let asset = gpu.upload(&gaussians).unwrap();
+    let expected = gpu.render_asset(&asset, &camera, &options()).unwrap();
+    assert!(expected.alpha.iter().any(|a| *a > 0.9));
+    assert_eq!(gpu.render_asset(&asset, &camera, &options()).unwrap(), expected, "a second time");
+    assert_eq!(gpu.render(&gaussians, &camera, &options()).unwrap(), expected, "uploaded again");
+    let mut alter: Vec<(&str, Box<dyn Fn(GpuRenderer) -> GpuRenderer>)> = Vec::new();
+    alter.push(("bands", Box::new(|gpu| gpu.bounded(|b| b.pixels = 200 * 40))));
+    alter.push(("slices", Box::new(|gpu| gpu.bounded(|b| b.pairs = 1000))));
+    alter.push(("chunks", Box::new(|gpu| gpu.bounded(|b| b.binding = 1 << 18))));
+    for (name, alter) in alter {
+        let found = alter(renderer().unwrap()).render(&gaussians, &camera, &options()).unwrap();
+        assert!(found == expected, "{name}");
+    }
+}
+
+#[test]
+fn any_finite_input_gives_a_finite_picture() {
+    let Some(gpu) = renderer() else { return };
+    let values = [1.2e-38f32, 1e-20, 1e-8, 1e-3, 1.0, 1e4, 1e9];
+    let (mut means, mut scales) = (Vec::new(), Vec::new());
+    let (mut rotations, mut opacities, mut sh) = (Vec::new(), Vec::new(), Vec::new());
+    let mut i = 0u32;
+    for a in values {
+        for b in values {
+            let places =
+                [(a, 0.0), (b, 1e-6), (1e-3, 0.011), (1e9, 1.0), (1.2e-38, 1e3), (1.0, 1e9), (1.0, 3e38)];
+            for (c, x) in places {
+                i += 1;
+                let t = i as f32;
+                means.push([x, x * t.sin(), x * t.cos()]);
+                scales.push([a, b, c]);
+                rotations.push([t.sin(), (2.0 * t).cos(), (3.0 * t).sin(), 0.3]);
+                opacities.push([0.0, 1.0, 0.0039, 0.5, 1e-30][i as usize % 5]);
+                sh.extend((0..48).map(|k| [1e6, -1e6, 1e-30, 0.3, f32::MAX][(i as usize + k) % 5]));
+            }
+        }
+    }
+    let all = Gaussians::from_arrays(3, means, rotations, scales, opacities, sh).unwrap();
+    let asset = gpu.upload(&all).unwrap();
+    for (width, height) in [(1, 1), (70, 50), (8192, 1), (1, 8192)] {
+        for focal in [1e-3, 1.0, 50.0, 1e6, 1e9] {
+            for (cx, antialiased) in [(0.0, false), (0.5, true), (1e9, false), (-1e9, true)] {
+                let mut camera = forward(width, height, focal);
+                camera.intrinsics.cx = (f64::from(width) * cx).clamp(-1e9, 1e9);
+                let options = RenderOptions { near: 1e-6, antialiased, max_alpha: 0.9999, ..options() };
+                let picture = gpu.render_asset(&asset, &camera, &options).unwrap();
+                assert!(is_finite(&picture), "{width}x{height}, focal length {focal}, cx {cx}");
+            }
+        }
+    }
+    let camera = forward(40, 30, 30.0);
+    for k in 0..all.len() {
+        let one = all.filtered(&(0..all.len()).map(|i| i == k).collect::<Vec<bool>>());
+        assert!(is_finite(&gpu.render(&one, &camera, &options()).unwrap()), "{one:?}");
+    }
+}
+
+#[test]
+fn the_largest_picture_an_empty_one_and_one_with_all_culled() {
+    let Some(gpu) = renderer() else { return };
+    let n = 30;
+    let means = (0..n).map(|i| [5.0, 3.4 - 0.23 * i as f32, 3.4 - 0.23 * i as f32]).collect();
+    let g =
+        Gaussians::from_arrays(0, means, vec![UNIT; n], vec![[0.002; 3]; n], vec![0.8; n], vec![0.3; 3 * n]);
+    let g = g.unwrap();
+    let camera = forward(8192, 8192, 6000.0);
+    let expected = CpuRenderer::new().render(&g, &camera, &options()).unwrap();
+    let found = gpu.render(&g, &camera, &options()).unwrap();
+    // Comparing by sorting 200 million numbers takes longer than drawing them.
+    let off = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(off(found.color.as_flattened(), expected.color.as_flattened()) < 2e-5);
+    assert!(off(&found.alpha, &expected.alpha) < 2e-5 && off(&found.depth, &expected.depth) < 1e-3);
+    assert!(found.alpha.iter().filter(|a| **a > 0.5).count() > 100);
+    drop((expected, found));
+
+    let camera = forward(300, 200, 200.0);
+    for g in [Gaussians::default(), walls(10, 0.9, 1.0).transformed_behind()] {
+        let picture = gpu.render(&g, &camera, &options()).unwrap();
+        assert!(picture.color.iter().all(|c| *c == [0.1, 0.2, 0.3]));
+        assert!(picture.alpha.iter().chain(&picture.depth).all(|v| *v == 0.0));
+    }
+}
+
+/// Behind the camera of [`forward`].
+trait Behind {
+    fn transformed_behind(self) -> Self;
+}
+
+impl Behind for Gaussians {
+    fn transformed_behind(self) -> Self {
+        let means = self.means().iter().map(|m| [-m[0], m[1], m[2]]).collect();
+        let arrays = (self.rotations().to_vec(), self.scales().to_vec(), self.opacities().to_vec());
+        Self::from_arrays(0, means, arrays.0, arrays.1, arrays.2, self.sh().to_vec()).unwrap()
+    }
+}
+
+#[test]
+fn walls_that_cover_a_large_picture_cost_what_the_first_few_do() {
+    let Some(gpu) = renderer() else { return };
+    // 20,000 walls on 64 x 64 tiles are 82 M pairs; the first slice finishes every pixel.
+    let picture = gpu.render(&walls(20_000, 0.9, 1e5), &forward(512, 512, 500.0), &options()).unwrap();
+    assert!(picture.alpha.iter().all(|a| *a > 0.99));
+}
+
+#[test]
+fn a_lost_device_and_what_does_not_fit_are_errors_that_say_so() {
+    let Some(gpu) = renderer() else { return };
+    let g = random(12, 100, 0, [0.01, 0.1]);
+    let camera = looking_at_origin(64, 48, DVec3::X, 7.0);
+    let asset = gpu.upload(&g).unwrap();
+    assert!(gpu.working_bytes() == 0 && asset.bytes() == 100 * 4 * 14);
+    gpu.render_asset(&asset, &camera, &options()).unwrap();
+    assert!(gpu.working_bytes() > 100 * 100);
+    gpu.lose_device();
+    for error in [
+        gpu.render_asset(&asset, &camera, &options()).unwrap_err(),
+        gpu.render(&g, &camera, &options()).unwrap_err(),
+        gpu.upload(&g).unwrap_err(),
+    ] {
+        let text = error.to_string();
+        assert!(text.starts_with("graphics processor: ") && text.contains("was lost"), "{text}");
+    }
+
+    let small = renderer().unwrap().bounded(|b| b.binding = 32 * 99);
+    let text = small.upload(&g).unwrap_err().to_string();
+    assert!(text.starts_with("gaussians: 100 of them; allowed: 0 to 99"), "{text}");
+
+    let mut camera = camera;
+    camera.width = 0;
+    let text = small.render(&g, &camera, &options()).unwrap_err().to_string();
+    assert!(text.starts_with("camera.size"), "{text}");
+}
+
+#[test]
+fn eight_threads_share_one_renderer() {
+    let Some(gpu) = renderer() else { return };
+    let asset = gpu.upload(&random(13, 500, 1, [0.01, 0.1])).unwrap();
+    let camera = |i: u32| looking_at_origin(40 + i, 30, DVec3::new(0.3, -1.0, 0.2), 6.0);
+    let alone: Vec<Rendered> =
+        (0..8).map(|i| gpu.render_asset(&asset, &camera(i), &options()).unwrap()).collect();
+    std::thread::scope(|scope| {
+        for (i, expected) in alone.iter().enumerate() {
+            let (gpu, asset) = (&gpu, &asset);
+            scope.spawn(move || {
+                for _ in 0..3 {
+                    assert!(gpu.render_asset(asset, &camera(i as u32), &options()).unwrap() == *expected);
+                }
+            });
+        }
+    });
+}
+
+#[test]
+fn hardware_alone_is_hardware() {
+    match GpuRenderer::new(Adapter::Hardware) {
+        Ok(gpu) => assert!(!gpu.is_software(), "{}", gpu.name()),
+        Err(e) => assert!(e.to_string().starts_with("graphics processor: n"), "{e}"),
+    }
+}
