@@ -197,6 +197,7 @@ struct Free {
     void operator()(vg_gaussians *handle) const noexcept { vg_gaussians_free(handle); }
     void operator()(vg_report *handle) const noexcept { vg_report_free(handle); }
     void operator()(vg_scene *handle) const noexcept { vg_scene_free(handle); }
+    void operator()(vg_renderer *handle) const noexcept { vg_renderer_free(handle); }
 };
 
 } // namespace detail
@@ -778,6 +779,53 @@ struct Picture {
     std::vector<std::uint8_t> color;
     /// Planar depth, metres; 0 where nothing is. `[height][width]`
     std::vector<float> depth;
+};
+
+/// Settings of a renderer.
+struct RendererOptions : vg_renderer_options {
+    RendererOptions() noexcept : vg_renderer_options{} {
+        vg_renderer_options_init(this, sizeof(vg_renderer_options));
+    }
+};
+
+/// Gaussians made ready to be drawn many times, by the CPU or a graphics processor. It keeps the Gaussians.
+class Renderer {
+  public:
+    using Handle = vg_renderer;
+
+    Renderer() noexcept = default;
+    explicit Renderer(vg_renderer *owned) noexcept : handle_(owned) {}
+
+    static Result<Renderer> make(const Gaussians &gaussians, const RendererOptions &options = {}) {
+        return detail::made<Renderer>([&](vg_renderer **out, vg_error **error) {
+            return vg_renderer_new(gaussians.get(), &options, out, error);
+        });
+    }
+
+    /// Who draws.
+    vg_backend backend() const noexcept { return static_cast<vg_backend>(vg_renderer_backend(handle_.get())); }
+    /// Who draws, and why, in one line.
+    const char *choice() const noexcept { return vg_renderer_choice(handle_.get()); }
+
+    /// `count` pictures, one per camera, into memory of the caller's.
+    Result<void> render_into(const vg_image_target *targets, const vg_camera *cameras, std::size_t count,
+                             const RenderOptions &options = {}) const {
+        return detail::done([&](vg_error **error) {
+            return vg_renderer_render(handle_.get(), cameras, count, &options, targets, error);
+        });
+    }
+    /// One picture.
+    Result<void> render_into(const vg_image_target &target, const vg_camera &camera,
+                             const RenderOptions &options = {}) const {
+        return render_into(&target, &camera, 1, options);
+    }
+
+    vg_renderer *get() const noexcept { return handle_.get(); }
+    /// The handle, now the caller's to free.
+    vg_renderer *release() noexcept { return handle_.release(); }
+
+  private:
+    std::unique_ptr<vg_renderer, detail::Free> handle_;
 };
 
 /// Draws Gaussians as a camera sees them into memory of the caller's.

@@ -6,10 +6,12 @@ use common::gpu::renderer;
 use common::scenes::{looking_at_origin, random, surfel_car};
 use common::{compare, is_finite};
 use glam::{DMat3, DVec3};
+use std::sync::Arc;
 use vg::geometry::Distortion;
 use vg::geometry::camera::Intrinsics;
 use vg::render::{
-    Adapter, Background, CpuRenderer, DepthMode, GpuRenderer, Reference, RenderOptions, Rendered, Renderer,
+    Adapter, AssetRenderer, Backend, Background, CpuRenderer, DepthMode, GpuRenderer, Reference,
+    RenderOptions, Rendered, Renderer,
 };
 use vg::{Camera, Gaussians, Pose};
 
@@ -299,6 +301,36 @@ fn eight_threads_share_one_renderer() {
             });
         }
     });
+}
+
+#[test]
+fn an_asset_is_drawn_by_whom_it_was_asked_of_and_by_the_cpu_when_the_device_goes() {
+    if renderer().is_none() {
+        return;
+    }
+    let gaussians = Arc::new(random(14, 300, 1, [0.01, 0.1]));
+    let camera = looking_at_origin(64, 48, DVec3::new(0.3, -1.0, 0.2), 6.0);
+    let cpu = AssetRenderer::new(Arc::clone(&gaussians), Backend::Cpu).unwrap();
+    let expected = cpu.render(&camera, &options()).unwrap();
+    let [stern, lenient] = [false, true].map(|lenient| {
+        let ready = AssetRenderer::new(Arc::clone(&gaussians), Backend::Gpu).unwrap();
+        if lenient { ready.falling_back() } else { ready }
+    });
+    for ready in [&stern, &lenient] {
+        assert_eq!(ready.choice().backend, Backend::Gpu);
+        assert_close("asset", &ready.render(&camera, &options()).unwrap(), &expected, 1e-6, 2e-5);
+    }
+    let device = stern.gpu().unwrap();
+    assert!(Arc::ptr_eq(&device, &lenient.gpu().unwrap()), "one device for both");
+    device.lose_device();
+    let error = stern.render(&camera, &options()).unwrap_err().to_string();
+    assert!(error.contains("was lost"), "{error}");
+    assert_eq!(lenient.render(&camera, &options()).unwrap(), expected);
+    let choice = lenient.choice();
+    assert!(choice.backend == Backend::Cpu && choice.why.contains("was lost"), "{choice}");
+    // Whoever comes next gets a new device.
+    let next = AssetRenderer::new(gaussians, Backend::Gpu).unwrap();
+    assert_close("next", &next.render(&camera, &options()).unwrap(), &expected, 1e-6, 2e-5);
 }
 
 #[test]

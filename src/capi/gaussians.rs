@@ -1,6 +1,6 @@
 //! Gaussians: borrowed arrays, files, and what can be made of them.
 
-use super::guard::{clear, free, guarded, guarded_value};
+use super::guard::{clear, guarded, guarded_value};
 use super::options::sh_degree;
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
@@ -10,6 +10,7 @@ use crate::geometry::Similarity;
 use crate::io::ply;
 use crate::progress::Threads;
 use std::ffi::c_char;
+use std::sync::Arc;
 
 /// A set of Gaussians. Owned by the caller, who frees it with `vg_gaussians_free`. It never changes: `transform`,
 /// `mirror` and `merge` return new ones, and any number of threads may read or render one at a time.
@@ -29,8 +30,19 @@ const ARRAYS: [(&str, &str); 5] = [
     ("sh", "arrays.sh"),
 ];
 
+/// A handle is a count of one on an `Arc`: a renderer may outlive it.
 pub(super) fn into_raw(gaussians: Gaussians) -> *mut vg_gaussians {
-    Box::into_raw(Box::new(gaussians)).cast()
+    Arc::into_raw(Arc::new(gaussians)).cast_mut().cast()
+}
+
+/// The same Gaussians, kept as long as somebody has them.
+pub(super) unsafe fn shared(argument: &str, gaussians: *const vg_gaussians) -> Result<Arc<Gaussians>> {
+    unsafe {
+        required(argument, gaussians)?;
+        let handle = gaussians.cast::<Gaussians>();
+        Arc::increment_strong_count(handle);
+        Ok(Arc::from_raw(handle))
+    }
 }
 
 pub(super) unsafe fn required<'a>(argument: &str, gaussians: *const vg_gaussians) -> Result<&'a Gaussians> {
@@ -295,7 +307,11 @@ pub unsafe extern "C" fn vg_gaussians_merge(
 /// Frees Gaussians. Pointers into them end. NULL: nothing happens.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn vg_gaussians_free(gaussians: *mut vg_gaussians) {
-    unsafe { free(gaussians.cast::<Gaussians>()) }
+    guarded_value((), || {
+        if !gaussians.is_null() {
+            drop(unsafe { Arc::from_raw(gaussians.cast::<Gaussians>()) });
+        }
+    });
 }
 
 unsafe fn make(

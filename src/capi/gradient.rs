@@ -6,7 +6,7 @@ use super::gaussians::{self, vg_gaussians};
 use super::guard::guarded;
 use super::image::extent;
 use super::read::{self, Versioned};
-use super::render::{Target, vg_alpha, vg_image_target, vg_render_options};
+use super::render::{Target, vg_alpha, vg_backend, vg_image_target, vg_render_options};
 use super::status::{vg_error, vg_status};
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
@@ -182,9 +182,20 @@ pub unsafe extern "C" fn vg_render_backward(
             let camera = camera::camera("camera", &read::required("camera", camera)?)?;
             let options = read::optional("options", options)?;
             let (settings, alpha) = options.read()?;
+            if options.backend == vg_backend::Gpu as i32 {
+                return Err(Error::NotBuilt {
+                    argument: "options.backend".into(),
+                    found: "the gradient of a gpu's picture".into(),
+                    remedy: "go back with auto or cpu".into(),
+                });
+            }
             let target = match target.is_null() {
                 true => None,
-                false => Some(Target::read(target, &settings, alpha, camera.width, camera.height)?),
+                false => {
+                    let (target, width, height) =
+                        (read::required("target", target)?, camera.width, camera.height);
+                    Some(Target::read("target", &target, &settings, alpha, width, height)?)
+                }
             };
             let planes = Planes::read(gradient, target.is_some(), camera.width, camera.height)?;
             if planes.color.is_some()

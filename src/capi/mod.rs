@@ -41,6 +41,8 @@ mod reconstruct;
 
 mod render;
 
+mod renderer;
+
 mod gradient;
 
 mod segment;
@@ -65,6 +67,7 @@ pub use model::*;
 pub use options::*;
 pub use reconstruct::*;
 pub use render::*;
+pub use renderer::*;
 pub use report::*;
 pub use scene::*;
 pub use segment::*;

@@ -9,18 +9,22 @@ use super::options::sh_degree;
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
 use crate::error::{Error, Result};
-use crate::render::{Background, DepthMode, RenderOptions, Rendered};
+use crate::gaussians::Gaussians;
+use crate::geometry::Camera;
+use crate::render::backend::is_built;
+use crate::render::{Backend, Background, DepthMode, RenderOptions, Rendered};
 use std::ffi::c_void;
 
 /// What draws.
 #[repr(i32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum vg_backend {
-    /// What is best of what this build and this machine have.
+    /// What is best of what this build and this machine have; for a single picture the CPU.
     Auto = 0,
     /// The context's threads.
     Cpu = 1,
-    /// A graphics processor. `VG_STATUS_NOT_BUILT` in a build without it.
+    /// A graphics processor, or a driver that stands in for one. `VG_STATUS_NOT_BUILT` in a build without it,
+    /// `VG_STATUS_MISSING` on a machine without a driver.
     Gpu = 2,
 }
 
@@ -64,7 +68,8 @@ pub struct vg_render_options {
     /// Threads and memory to use. NULL: made for this call, one thread per core; make one where pictures follow
     /// each other.
     pub context: *mut vg_context,
-    /// A `vg_backend`. Default `VG_BACKEND_AUTO`.
+    /// A `vg_backend`. Default `VG_BACKEND_AUTO`. Where pictures follow each other a `vg_renderer` is faster: a graphics
+    /// processor is sent the Gaussians once. `vg_render_backward` draws on the CPU alone.
     pub backend: i32,
     /// A `vg_background`. Default `VG_BACKGROUND_COLOR`.
     pub background: i32,
@@ -201,10 +206,16 @@ pub unsafe extern "C" fn vg_render(
             let camera = camera::camera("camera", &read::required("camera", camera)?)?;
             let options = read::optional("options", options)?;
             let (settings, alpha) = options.read()?;
-            let target = Target::read(target, &settings, alpha, camera.width, camera.height)?;
+            let target = read::required("target", target)?;
+            let target = Target::read("target", &target, &settings, alpha, camera.width, camera.height)?;
             in_context(options.context, |shop| {
                 shop.with_picture(|picture| {
-                    shop.threads.run(|| shop.renderer.render_into(gaussians, &camera, &settings, picture))?;
+                    match options.backend == vg_backend::Gpu as i32 {
+                        true => gpu_picture(gaussians, &camera, &settings, picture)?,
+                        false => shop.threads.run(|| {
+                            shop.renderer.render_into(gaussians, &camera, &settings, picture).map(drop)
+                        })?,
+                    }
                     target.write(picture);
                     Ok(())
                 })
@@ -213,20 +224,49 @@ pub unsafe extern "C" fn vg_render(
     }
 }
 
+/// Who is asked to draw, if this build can.
+pub(super) fn backend(argument: &str, number: i32) -> Result<Backend> {
+    let backends = [
+        (vg_backend::Auto as i32, "auto", Backend::Auto),
+        (vg_backend::Cpu as i32, "cpu", Backend::Cpu),
+        (vg_backend::Gpu as i32, "gpu", Backend::Gpu),
+    ];
+    match read::choice(argument, number, &backends)? {
+        Backend::Gpu if !is_built() => Err(Error::NotBuilt {
+            argument: argument.into(),
+            found: "gpu".into(),
+            remedy: "build with the feature gpu, or draw with auto or cpu".into(),
+        }),
+        backend => Ok(backend),
+    }
+}
+
+/// One picture by a graphics processor, to which the Gaussians are copied for it.
+#[cfg(feature = "gpu")]
+fn gpu_picture(
+    gaussians: &Gaussians,
+    camera: &Camera,
+    settings: &RenderOptions,
+    picture: &mut Rendered,
+) -> Result<()> {
+    use crate::render::{Adapter, GpuRenderer, Renderer};
+    *picture = GpuRenderer::shared(Adapter::Any)?.render(gaussians, camera, settings)?;
+    Ok(())
+}
+
+/// `backend` has refused before.
+#[cfg(not(feature = "gpu"))]
+fn gpu_picture(_: &Gaussians, _: &Camera, _: &RenderOptions, _: &mut Rendered) -> Result<()> {
+    Err(Error::NotBuilt {
+        argument: "options.backend".into(),
+        found: "gpu".into(),
+        remedy: "draw with auto or cpu".into(),
+    })
+}
+
 impl vg_render_options {
     pub(super) fn read(&self) -> Result<(RenderOptions, vg_alpha)> {
-        let backends = [
-            (vg_backend::Auto as i32, "auto", true),
-            (vg_backend::Cpu as i32, "cpu", true),
-            (vg_backend::Gpu as i32, "gpu", false),
-        ];
-        if !read::choice("options.backend", self.backend, &backends)? {
-            return Err(Error::NotBuilt {
-                argument: "options.backend".into(),
-                found: "gpu".into(),
-                remedy: "this version draws with auto or cpu".into(),
-            });
-        }
+        backend("options.backend", self.backend)?;
         let backgrounds = [
             (vg_background::Color as i32, "color", Background::Color(self.background_color)),
             (vg_background::Transparent as i32, "transparent", Background::Transparent),
@@ -296,31 +336,33 @@ impl Layout {
 }
 
 impl Target {
-    pub(super) unsafe fn read(
-        target: *const vg_image_target,
+    /// `argument` is what errors call the target.
+    pub(super) fn read(
+        argument: &str,
+        target: &vg_image_target,
         settings: &RenderOptions,
         alpha: vg_alpha,
         width: u32,
         height: u32,
     ) -> Result<Self> {
-        let target = unsafe { read::required("target", target)? };
-        read::zero("target.flags", target.flags == 0)?;
+        let named = |field: &str| format!("{argument}.{field}");
+        read::zero(&named("flags"), target.flags == 0)?;
         if (target.width, target.height) != (width, height) {
             let found = format!("{}x{}", target.width, target.height);
             let allowed = format!("the camera's size, {width}x{height}");
-            return Err(Error::argument("target.size", found, allowed));
+            return Err(Error::argument(named("size"), found, allowed));
         }
         if target.color.is_null() && target.depth.is_null() && target.alpha.is_null() {
             let found = "neither color nor depth nor alpha";
-            return Err(Error::argument("target", found, "at least one of them"));
+            return Err(Error::argument(argument, found, "at least one of them"));
         }
         let opaque = settings.background != Background::Transparent;
         let color = match target.color.is_null() {
             true => None,
             false => {
-                let layout = layout(target.color_format, opaque)?;
+                let layout = layout(&named("color_format"), target.color_format, opaque)?;
                 let (_, stride) = extent(
-                    "target.color",
+                    &named("color"),
                     "_row_stride",
                     width,
                     height,
@@ -330,16 +372,16 @@ impl Target {
                 Some((target.color.cast(), stride, Pixel { layout, opaque, alpha }))
             }
         };
-        let plane = |argument: &str, first: *mut c_void, row_stride: usize| match first.is_null() {
+        let plane = |plane: &str, first: *mut c_void, row_stride: usize| match first.is_null() {
             true => Ok(None),
             false => {
                 let bytes = size_of::<f32>();
-                let (_, stride) = extent(argument, "_row_stride", width, height, row_stride, bytes)?;
+                let (_, stride) = extent(plane, "_row_stride", width, height, row_stride, bytes)?;
                 Ok(Some((first.cast(), stride)))
             }
         };
-        let depth = plane("target.depth", target.depth, target.depth_row_stride)?;
-        let alpha = plane("target.alpha", target.alpha, target.alpha_row_stride)?;
+        let depth = plane(&named("depth"), target.depth, target.depth_row_stride)?;
+        let alpha = plane(&named("alpha"), target.alpha, target.alpha_row_stride)?;
         Ok(Self { color, depth, alpha })
     }
 
@@ -366,7 +408,7 @@ impl Target {
     }
 }
 
-fn layout(format: i32, opaque: bool) -> Result<Layout> {
+fn layout(argument: &str, format: i32, opaque: bool) -> Result<Layout> {
     let all = [
         (vg_format::Rgba8 as i32, "RGBA8", Layout::Rgba8),
         (vg_format::Bgra8 as i32, "BGRA8", Layout::Bgra8),
@@ -375,7 +417,7 @@ fn layout(format: i32, opaque: bool) -> Result<Layout> {
         (vg_format::Bgr8 as i32, "BGR8", Layout::Bgr8),
     ];
     // Without alpha there is no way to say that nothing is there.
-    read::choice("target.color_format", format, if opaque { &all } else { &all[..3] })
+    read::choice(argument, format, if opaque { &all } else { &all[..3] })
 }
 
 impl Pixel {

@@ -69,6 +69,7 @@ fn layout_of_rust() -> String {
             struct_size context backend background background_color alpha depth_mode sh_degree antialiased blur
             near_plane far_plane max_alpha flags
         }
+        vg_renderer_options { struct_size context backend flags }
         vg_report_figures {
             struct_size gaussian_count mirrored_count views_used threads prior sh_degree total_ms peak_rss_bytes
             has_input_error has_box input_psnr_db input_silhouette_iou box_size extent_low extent_high relit_count
@@ -159,6 +160,7 @@ fn vg_abi_witness(
 fn vg_abi_witness_more(
     _: &vg_image_gradient,
     _: &vg_render_options,
+    _: &vg_renderer_options,
     _: &vg_report_figures,
     _: &vg_scene_options,
     _: &vg_segment_options,
@@ -271,6 +273,12 @@ fn every_function() -> Vec<(&'static str, Call)> {
         vg_render_options_init(null_mut(), 0) status;
         vg_image_target_init(null_mut(), 0) status;
         vg_render(null(), null(), null(), null()) reports;
+        vg_renderer_options_init(null_mut(), 0) status;
+        vg_renderer_new(null(), null(), null_mut()) reports;
+        vg_renderer_render(null(), null(), 0, null(), null()) reports;
+        vg_renderer_backend(null()) value;
+        vg_renderer_choice(null()) text;
+        vg_renderer_free(null_mut()) none;
         vg_image_gradient_init(null_mut(), 0) status;
         vg_gradients_init(null_mut(), 0) status;
         vg_render_backward(null(), null(), null(), null(), null(), null()) reports;

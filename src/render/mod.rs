@@ -1,5 +1,6 @@
 //! Alpha-blended splatting (method section 5): options, targets, and the renderers behind one trait.
 
+pub mod backend;
 pub mod cpu;
 pub mod distorted;
 #[cfg(feature = "gpu")]
@@ -11,6 +12,7 @@ pub mod output;
 pub mod reference;
 mod view;
 
+pub use backend::{AssetRenderer, Backend, Choice};
 pub use cpu::CpuRenderer;
 #[cfg(feature = "gpu")]
 pub use gpu::{Adapter, GpuAsset, GpuRenderer};

@@ -195,7 +195,7 @@ fn expected(outcome: Outcome, words: String) -> Expect {
 const SIZED: [&str; 2] = ["vg_report_get_figures", "vg_scene_get_view"];
 
 /// Functions that cannot fail, all called by `what_cannot_fail_accepts_null`.
-const NEVER_FAIL: [&str; 23] = [
+const NEVER_FAIL: [&str; 26] = [
     "vg_version",
     "vg_abi_version",
     "vg_error_code",
@@ -216,6 +216,9 @@ const NEVER_FAIL: [&str; 23] = [
     "vg_gaussians_opacities",
     "vg_gaussians_sh",
     "vg_gaussians_free",
+    "vg_renderer_backend",
+    "vg_renderer_choice",
+    "vg_renderer_free",
     "vg_scene_view_count",
     "vg_scene_free",
     "vg_model_free",
@@ -254,7 +257,10 @@ fn what_cannot_fail_accepts_null() {
         ] {
             assert!(array(null()).is_null());
         }
+        assert_eq!(vg_renderer_backend(null()), vg_backend::Auto as i32);
+        assert_eq!(CStr::from_ptr(vg_renderer_choice(null())), c"");
         assert_eq!(vg_scene_view_count(null()), 0);
+        vg_renderer_free(null_mut());
         vg_error_free(null_mut());
         vg_context_free(null_mut());
         vg_report_free(null_mut());

@@ -4,7 +4,7 @@ use crate::tools::{STRICT, assert_golden, cc, cxx, have, root, run, scratch};
 use std::process::Command;
 
 /// The chapters of the header.
-const CHAPTERS: [&str; 17] = [
+const CHAPTERS: [&str; 18] = [
     "version",
     "status",
     "context",
@@ -17,6 +17,7 @@ const CHAPTERS: [&str; 17] = [
     "gaussians",
     "reconstruct",
     "render",
+    "renderer",
     "gradient",
     "segment",
     "metrics",

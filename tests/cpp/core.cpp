@@ -292,6 +292,15 @@ void pictures_own_their_pixels(const vg::Gaussians &car) {
     target.height = side;
     target.depth = metres.data();
     CHECK(vg::render_into(target, car, camera, with_context).ok());
+    vg::RendererOptions on_cpu;
+    on_cpu.backend = VG_BACKEND_CPU;
+    const vg::Renderer ready = vg::Renderer::make(car, on_cpu).take();
+    CHECK(ready.backend() == VG_BACKEND_CPU && std::string(ready.choice()).find("asked for") != std::string::npos);
+    const vg_image_target both[] = {target, target};
+    const vg_camera from_both[] = {camera, camera};
+    CHECK(ready.render_into(both, from_both, 2, with_context).ok() && ready.render_into(target, camera).ok());
+    CHECK(failed(ready.render_into(nullptr, nullptr, 0), VG_STATUS_ARGUMENT, "count"));
+    CHECK(failed(vg::Renderer::make(vg::Gaussians()), VG_STATUS_ARGUMENT, "gaussians"));
     CHECK(metres == rgb.depth);
 }
 

@@ -150,7 +150,8 @@ fn views_of(
     }
     let view = |(i, camera): (usize, &Bound<'_, Camera>)| {
         let camera = camera.get().inner;
-        let mask = masks[i].as_ref().map(|object| mask(object, &format!("masks[{i}]"), &camera)).transpose()?;
+        let mask =
+            masks[i].as_ref().map(|object| mask(object, &format!("masks[{i}]"), &camera)).transpose()?;
         let name = names.as_ref().map_or_else(|| format!("{i:03}"), |names| names[i].clone());
         View::without_picture(name, camera, mask).map_err(|e| from_library(py, e))
     };

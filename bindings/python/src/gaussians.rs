@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyString, PyType};
 use std::path::PathBuf;
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 use vg::io::ply;
 use vg::render::{
     Background, CpuRenderer, DepthMode, Differentiable, PictureGradient, RenderOptions, Rendered, Renderer,
@@ -23,7 +23,14 @@ static RENDERER: LazyLock<CpuRenderer> = LazyLock::new(CpuRenderer::new);
 /// new ones, and the arrays are read-only views that keep them alive.
 #[pyclass(module = "vehicle_gaussians", frozen)]
 pub(crate) struct Gaussians {
-    pub(crate) inner: vg::Gaussians,
+    /// Shared with the renderers that were made of them.
+    pub(crate) inner: Arc<vg::Gaussians>,
+}
+
+impl Gaussians {
+    pub(crate) fn of(inner: vg::Gaussians) -> Self {
+        Self { inner: Arc::new(inner) }
+    }
 }
 
 #[pymethods]
@@ -62,7 +69,7 @@ impl Gaussians {
             values(&opacities)?.to_vec(),
             values(&sh)?.to_vec(),
         )
-        .map(|inner| Self { inner })
+        .map(Self::of)
         .map_err(|e| from_library(py, e))
     }
 
@@ -71,7 +78,7 @@ impl Gaussians {
     #[pyo3(signature = (path))]
     fn load_ply(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let (inner, _) = pooled(py, 1, || ply::read(&path))?;
-        Ok(Self { inner })
+        Ok(Self::of(inner))
     }
 
     /// Writes a PLY file in the layout of 3D Gaussian Splatting. A file that is there is replaced only once the new
@@ -84,7 +91,7 @@ impl Gaussians {
     /// The mirror image across the plane of symmetry, y = 0.
     #[pyo3(signature = ())]
     fn mirrored(&self, py: Python<'_>) -> PyResult<Self> {
-        pooled(py, 1, || Ok(self.inner.mirrored())).map(|inner| Self { inner })
+        pooled(py, 1, || Ok(self.inner.mirrored())).map(Self::of)
     }
 
     /// These in another frame: to_from_vehicle is a 4x4 similarity. Colours turn with the vehicle. Coordinates must stay
@@ -93,14 +100,14 @@ impl Gaussians {
     fn transformed(&self, to_from_vehicle: &Bound<'_, PyAny>) -> PyResult<Self> {
         let similarity = similarity(to_from_vehicle, "to_from_vehicle")?;
         let inner = pooled(to_from_vehicle.py(), 0, || self.inner.transformed(&similarity))?;
-        Ok(Self { inner })
+        Ok(Self::of(inner))
     }
 
     /// These, then those of other, at the higher of their degrees of spherical harmonics.
     #[pyo3(signature = (other))]
     fn merged(&self, py: Python<'_>, other: &Bound<'_, Self>) -> PyResult<Self> {
         let other = &other.get().inner;
-        pooled(py, 1, || Ok(self.inner.merged(other))).map(|inner| Self { inner })
+        pooled(py, 1, || Ok(self.inner.merged(other))).map(Self::of)
     }
 
     /// The picture a camera takes: uint8 (height, width, 3), or (height, width, 4) with straight alpha on a
@@ -315,7 +322,7 @@ fn rows<const N: usize>(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<V
     }
 }
 
-fn parse_background(object: &Bound<'_, PyAny>) -> PyResult<Background> {
+pub(crate) fn parse_background(object: &Bound<'_, PyAny>) -> PyResult<Background> {
     let Ok(name) = object.cast::<PyString>() else {
         return vector::<3>(object, "background").map(|rgb| Background::Color(rgb.map(|c| c as f32)));
     };
@@ -391,7 +398,7 @@ impl Kind {
     }
 }
 
-fn picture<T: Element, const N: usize>(
+pub(crate) fn picture<T: Element, const N: usize>(
     py: Python<'_>,
     (height, width): (usize, usize),
     pixels: Vec<[T; N]>,

@@ -13,6 +13,7 @@ mod gaussians;
 mod metrics;
 mod model;
 mod reconstruct;
+mod renderer;
 mod scene;
 
 use pyo3::prelude::*;
@@ -33,6 +34,8 @@ mod _native {
     use crate::model::{Model, segment};
     #[pymodule_export]
     use crate::reconstruct::reconstruct;
+    #[pymodule_export]
+    use crate::renderer::Renderer;
     #[pymodule_export]
     use crate::scene::open_scene;
 

@@ -109,7 +109,7 @@ pub(crate) fn reconstruct<'py>(
         let positions = owned(py, (n, 3), cloud.positions.into_flattened());
         (positions, owned(py, (n, 3), cloud.colors.into_flattened()))
     });
-    Ok((Gaussians { inner: made.gaussians }, report, points))
+    Ok((Gaussians::of(made.gaussians), report, points))
 }
 
 /// By a number of steps, or by the time they take.

@@ -472,3 +472,19 @@ def test_the_environment_variable_names_the_library(tmp_path: Path) -> None:
         check=True,
     )
     assert ran.stdout.split() == [str(copy), str(copy), vg.__version__]
+
+
+def test_a_renderer_draws_several_pictures_of_one_call(made: vg.Reconstruction, views: Views) -> None:
+    g = made.gaussians
+    copy = capi.Gaussians.from_arrays(g.means, g.scales, g.quats, g.opacities, g.sh)
+    ready = capi.Renderer(copy, "cpu")
+    cameras = [views.cameras[0], views.cameras[0]]
+    expected = g.render(cameras[0])
+    del copy
+    gc.collect()
+    assert ready.backend == "cpu" and "asked for" in ready.choice
+    for picture in ready.render(cameras):
+        np.testing.assert_array_equal(picture, expected)
+    assert ready.render(cameras, "transparent").shape == (2, *expected.shape[:2], 4)
+    with pytest.raises(vg.VgError, match="cameras: 0 of several sizes or none"):
+        ready.render([])

@@ -223,3 +223,23 @@ def test_a_lens_bends_the_picture(made: vg.Reconstruction, ellipsoid: Views) -> 
     bent = vg.Camera.from_matrix(pinhole.K, pinhole.vehicle_from_camera, 96, 72, distortion=[-0.8, 0.3, 0, 0])
     areas = [int((made.gaussians.render(c) != 255).any(axis=2).sum()) for c in (pinhole, bent)]
     assert 0.5 < areas[1] / areas[0] < 0.99
+
+
+def test_a_renderer_draws_the_same_and_says_who_did(made: vg.Reconstruction, views: Views) -> None:
+    camera = views.cameras[0]
+    ready = vg.Renderer(made.gaussians, "cpu")
+    assert ready.backend == "cpu" and "asked for" in ready.choice and "cpu" in repr(ready)
+    for background in ("white", "transparent"):
+        expected = made.gaussians.render(camera, background)
+        np.testing.assert_array_equal(ready.render(camera, background), expected)
+    assert vg.Renderer(made.gaussians).backend in ("cpu", "gpu")
+    with pytest.raises(vg.VgError, match="backend: 'cuda'; allowed: auto, cpu or gpu"):
+        vg.Renderer(made.gaussians, "cuda")  # type: ignore[arg-type]
+    with pytest.raises(vg.VgError, match="gpu is not in this build|graphics processor"):
+        raise_unless_gpu(made.gaussians)
+
+
+def raise_unless_gpu(gaussians: vg.Gaussians) -> None:
+    """Drawing on a graphics processor, or the error that says why not."""
+    if vg.Renderer(gaussians, "gpu").backend == "gpu":
+        raise vg.VgError(vg.Status.MISSING, "graphics processor: there is one")

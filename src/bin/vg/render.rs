@@ -6,10 +6,11 @@ use crate::shown::Bar;
 use crate::{files, scene};
 use glam::{DMat3, DVec3};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use vg::geometry::Intrinsics;
 use vg::io::{self, NamedCamera, image, ply};
 use vg::progress::Threads;
-use vg::render::{Background, CpuRenderer, RenderOptions, Rendered, Renderer};
+use vg::render::{AssetRenderer, Background, RenderOptions, Rendered};
 use vg::{Camera, Gaussians, Pose};
 
 /// The turntable's camera looks down on the vehicle by this much, radians (12 degrees).
@@ -43,10 +44,10 @@ pub(crate) fn run(args: &RenderArgs) -> Result {
 
     let options = RenderOptions { background: args.background, ..RenderOptions::default() };
     let threads = Threads::new(args.threads)?;
-    let renderer = CpuRenderer::new();
+    let ready = AssetRenderer::new(Arc::new(gaussians), args.backend)?;
     let bar = Bar::of_pictures(cameras.len());
     for (i, named) in cameras.iter().enumerate() {
-        let drawn = threads.run(|| renderer.render(&gaussians, &named.camera, &options))?;
+        let drawn = threads.run(|| ready.render(&named.camera, &options))?;
         write(&pictures[i], &drawn, options.background)?;
         if args.depth {
             let beyond = image::write_depth16(&depths[i], drawn.width, drawn.height, &drawn.depth)?;
@@ -58,7 +59,8 @@ pub(crate) fn run(args: &RenderArgs) -> Result {
         bar.advance();
     }
     drop(bar);
-    Ok(Outcome::done(format!("{}: {} pictures", args.output.display(), cameras.len())))
+    let (folder, n) = (args.output.display(), cameras.len());
+    Ok(Outcome::done(format!("{folder}: {n} pictures by {}", ready.choice())))
 }
 
 /// An opaque picture, or one with its own alpha on a transparent background.

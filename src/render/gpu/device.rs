@@ -92,6 +92,11 @@ impl Device {
         !is_hardware(&self.info)
     }
 
+    /// Whether it is gone for good.
+    pub(super) fn is_lost(&self) -> bool {
+        locked(&self.trouble).lost.is_some()
+    }
+
     /// The error that came since this was last asked.
     pub(super) fn check(&self) -> Result<()> {
         let mut trouble = locked(&self.trouble);

@@ -26,7 +26,7 @@ use frame::{Frame, TILE};
 use kernels::Kernels;
 use memory::{Memory, PIXEL, SPLAT};
 use stages::{Stages, bits_of};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 /// Bounds of what is held at a time; tests lower them.
 #[derive(Clone, Copy, Debug)]
@@ -72,6 +72,21 @@ impl GpuRenderer {
         device.check()?;
         let bounds = Bounds { pairs: MOST_THREADS, pixels: 1 << 22, binding: device.largest_binding };
         Ok(Self { device, kernels, bounds, memory: Mutex::default(), lens: Mutex::default() })
+    }
+
+    /// The renderer that this process has open, or a new one: a device and its kernels are made once, for as long as
+    /// somebody holds them. One whose device was lost is not handed out again.
+    ///
+    /// Errors: those of [`GpuRenderer::new`].
+    pub fn shared(adapter: Adapter) -> Result<Arc<Self>> {
+        static OPEN: [Mutex<Weak<GpuRenderer>>; 2] = [Mutex::new(Weak::new()), Mutex::new(Weak::new())];
+        let mut open = OPEN[adapter as usize].lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(renderer) = open.upgrade().filter(|r| !r.device.is_lost()) {
+            return Ok(renderer);
+        }
+        let renderer = Arc::new(Self::new(adapter)?);
+        *open = Arc::downgrade(&renderer);
+        Ok(renderer)
     }
 
     /// The adapter's name, as its driver has it.

@@ -324,6 +324,7 @@ pub enum Made {
     Report,
     Scene,
     Model,
+    Renderer,
 }
 
 impl Made {
@@ -335,6 +336,7 @@ impl Made {
                 Self::Report => vg_report_free(handle as _),
                 Self::Scene => vg_scene_free(handle as _),
                 Self::Model => vg_model_free(handle as _),
+                Self::Renderer => vg_renderer_free(handle as _),
             }
         }
     }
@@ -653,6 +655,7 @@ pub struct World {
     /// Three of them, of degree 0.
     pub few: usize,
     pub report: usize,
+    pub renderer: usize,
     pub scene: usize,
     pub photographs: Vec<Photograph>,
     /// A folder with a `transforms.json`, a COLMAP model, pictures and depth.
@@ -670,6 +673,7 @@ impl World {
             gaussians: 0,
             few: 0,
             report: 0,
+            renderer: 0,
             scene: 0,
             photographs: vehicle::right_side(WIDTH, HEIGHT).views.iter().map(photograph).collect(),
             sample: sample.to_owned(),
@@ -689,6 +693,7 @@ impl World {
         (world.gaussians, world.report) = (done.handle("out_gaussians"), done.handle("out_report"));
         done.handles.clear();
         world.gaussians_saved();
+        world.renderer = keep(renderer_new(&world).run(true), "out");
         world.scene = keep(transforms_open(&world).run(true), "out");
         world
     }
@@ -717,6 +722,7 @@ impl Drop for World {
     fn drop(&mut self) {
         unsafe {
             vg_scene_free(self.scene as _);
+            vg_renderer_free(self.renderer as _);
             vg_report_free(self.report as _);
             vg_gaussians_free(self.few as _);
             vg_gaussians_free(self.gaussians as _);
@@ -815,7 +821,7 @@ const SIMILARITY: [f64; 16] =
 const POSE: [f64; 12] = [0.0, -1.0, 0.0, 4e5, 1.0, 0.0, 0.0, 5e6, 0.0, 0.0, 1.0, 100.0];
 
 /// A call that works, for each function that can fail.
-pub const CALLS: [fn(&World) -> Call; 53] = [
+pub const CALLS: [fn(&World) -> Call; 56] = [
     context_options_init,
     context_new,
     camera_init,
@@ -845,6 +851,9 @@ pub const CALLS: [fn(&World) -> Call; 53] = [
     image_target_init,
     render,
     render_through_a_lens,
+    renderer_options_init,
+    renderer_new,
+    renderer_render,
     image_gradient_init,
     gradients_init,
     render_backward,
@@ -872,7 +881,7 @@ pub const CALLS: [fn(&World) -> Call; 53] = [
 ];
 
 /// `sizeof` in the release that introduced them: no caller has shorter ones.
-pub const FIRST_SIZES: [(&str, usize); 19] = [
+pub const FIRST_SIZES: [(&str, usize); 20] = [
     ("vg_context_options", 16),
     ("vg_camera", 280),
     ("vg_view", 392),
@@ -881,6 +890,7 @@ pub const FIRST_SIZES: [(&str, usize); 19] = [
     ("vg_report_figures", 152),
     ("vg_gaussian_arrays", 64),
     ("vg_render_options", 72),
+    ("vg_renderer_options", 24),
     ("vg_image_target", 56),
     ("vg_image_gradient", 88),
     ("vg_gradients", 88),
@@ -921,6 +931,7 @@ init_of!(options_init, vg_options_init, "options", options(0));
 init_of!(report_figures_init, vg_report_figures_init, "figures", figures());
 init_of!(gaussian_arrays_init, vg_gaussian_arrays_init, "arrays", arrays(0, [0; 5], 0));
 init_of!(render_options_init, vg_render_options_init, "options", render_options(0));
+init_of!(renderer_options_init, vg_renderer_options_init, "options", renderer_options(0));
 init_of!(image_target_init, vg_image_target_init, "target", target([(0, 0); 3]));
 init_of!(image_gradient_init, vg_image_gradient_init, "gradient", image_gradient([0; 3]));
 init_of!(gradients_init, vg_gradients_init, "gradients", gradients(0, 0, [0; 8]));
@@ -1360,6 +1371,46 @@ fn render_as(w: &World, function: &'static str, camera: Lent) -> Call {
         .argument("options", Value::Struct(render_options(w.context)))
         .nullable()
         .argument("target", Value::Struct(lent));
+    call.targets = targets;
+    call
+}
+
+fn renderer_options(context: usize) -> Lent {
+    let fields = fields!(vg_renderer_options {
+        struct_size: elsewhere(),
+        context: elsewhere(),
+        backend: choice_without(&[0, 1], 2),
+        flags: reserved(),
+    });
+    let mut lent = Lent::zeroed::<vg_renderer_options>("vg_renderer_options", fields);
+    lent.put("context", 0, context as u64);
+    lent
+}
+
+pub fn renderer_new(w: &World) -> Call {
+    Call::new("vg_renderer_new", invoke!(vg_renderer_new 0 1 2))
+        .argument("gaussians", Value::Handle(w.gaussians))
+        .argument("options", Value::Struct(renderer_options(w.context)))
+        .nullable()
+        .argument("out", Value::OutHandle(Made::Renderer))
+}
+
+pub fn renderer_render(w: &World) -> Call {
+    let (mut lent, targets) = pictures();
+    let mut cameras = w.camera();
+    // Of one each.
+    (lent.is_array, cameras.is_array) = (true, true);
+    for field in &mut lent.fields {
+        field.word = field.word.replace("target.size", "size");
+    }
+    let mut call = Call::new("vg_renderer_render", invoke!(vg_renderer_render 0 1 2 3 4))
+        .argument("renderer", Value::Handle(w.renderer))
+        .argument("cameras", Value::Struct(cameras))
+        .argument("count", Value::Number(1))
+        .tries(counts(&[0, 4097, 1 << 60, usize::MAX as u64]))
+        .argument("options", Value::Struct(render_options(w.context)))
+        .nullable()
+        .argument("targets", Value::Struct(lent));
     call.targets = targets;
     call
 }

@@ -79,6 +79,25 @@ class Camera:
     def __ne__(self, other: object, /) -> bool: ...
 
 @final
+class Renderer:
+    def __init__(self, gaussians: Gaussians, backend: Literal["auto", "cpu", "gpu"] = "auto") -> None: ...
+    @property
+    def backend(self) -> str: ...
+    @property
+    def choice(self) -> str: ...
+    def render(
+        self,
+        camera: Camera,
+        background: str | npt.ArrayLike = "white",
+        threads: int = 0,
+        *,
+        antialiased: bool = False,
+        near: float = 0.01,
+        far: float = 1e10,
+        sh_degree: int = 3,
+    ) -> npt.NDArray[np.uint8]: ...
+
+@final
 class Gaussians:
     @staticmethod
     def from_arrays(

@@ -295,6 +295,15 @@ class vg_render_options(ct.Structure):
     )
 
 
+class vg_renderer_options(ct.Structure):
+    _fields_ = (
+        ("struct_size", ct.c_size_t),
+        ("context", ct.c_void_p),
+        ("backend", ct.c_int32),
+        ("flags", ct.c_uint32),
+    )
+
+
 class vg_image_target(ct.Structure):
     _fields_ = (
         ("struct_size", ct.c_size_t),
@@ -478,6 +487,15 @@ PROTOTYPES: Mapping[str, tuple[Any, tuple[Any, ...]]] = {
         _i32,
         (_handle, _pointer(vg_camera), _pointer(vg_render_options), _pointer(vg_image_target), _out),
     ),
+    "vg_renderer_options_init": (_i32, (_pointer(vg_renderer_options), _size)),
+    "vg_renderer_new": (_i32, (_handle, _pointer(vg_renderer_options), _out, _out)),
+    "vg_renderer_render": (
+        _i32,
+        (_handle, _pointer(vg_camera), _size, _pointer(vg_render_options), _pointer(vg_image_target), _out),
+    ),
+    "vg_renderer_backend": (_i32, (_handle,)),
+    "vg_renderer_choice": (_text, (_handle,)),
+    "vg_renderer_free": (None, (_handle,)),
     "vg_image_gradient_init": (_i32, (_pointer(vg_image_gradient), _size)),
     "vg_gradients_init": (_i32, (_pointer(vg_gradients), _size)),
     "vg_render_backward": (
@@ -1018,6 +1036,59 @@ class Gaussians:
 
     def __repr__(self) -> str:
         return f"Gaussians({len(self)}, sh_degree={self.sh_degree})"
+
+
+class Renderer(_Handle):
+    """Gaussians made ready to be drawn many times: backend is "auto", "cpu" or "gpu". Any number of threads may use one
+    at a time."""
+
+    def __init__(
+        self,
+        gaussians: Gaussians,
+        backend: Literal["auto", "cpu", "gpu"] = "auto",
+        context: Context | None = None,
+    ) -> None:
+        options = _initial(vg_renderer_options)
+        options.backend = _choice(Backend, "backend", backend)
+        options.context = None if context is None else context._as_parameter_
+        made = ct.c_void_p()
+        _call("vg_renderer_new", gaussians._handle, ct.byref(options), ct.byref(made))
+        super().__init__("renderer", made)
+
+    @property
+    def backend(self) -> str:
+        """Who draws: "cpu" or "gpu"."""
+        return Backend(library.vg_renderer_backend(self)).name.lower()
+
+    @property
+    def choice(self) -> str:
+        """Who draws, and why."""
+        return _utf8(library.vg_renderer_choice(self))
+
+    def render(
+        self,
+        cameras: Sequence[Camera],
+        background: str | Sequence[float] = "white",
+        *,
+        antialiased: bool = False,
+        context: Context | None = None,
+    ) -> npt.NDArray[np.uint8]:
+        """Pictures of cameras of one size: uint8 (n, height, width, 3), or 4 with straight alpha on a "transparent"
+        background."""
+        posed = [_camera(camera) for camera in cameras]
+        if len({(camera.width, camera.height) for camera in posed}) != 1:
+            raise VgError(Status.ARGUMENT, f"cameras: {len(posed)} of several sizes or none; allowed: of one size")
+        options = _render_options(background, antialiased, context)
+        opaque = options.background == Background.COLOR
+        format, channels = (Format.RGB8, 3) if opaque else (Format.RGBA8, 4)
+        pictures = np.empty((len(posed), posed[0].height, posed[0].width, channels), np.uint8)
+        targets = (vg_image_target * len(posed))(*[_initial(vg_image_target) for _ in posed])
+        for target, camera, picture in zip(targets, posed, pictures, strict=True):
+            target.width, target.height = camera.width, camera.height
+            target.color, target.color_format = picture.ctypes.data, format
+        array = (vg_camera * len(posed))(*posed)
+        _call("vg_renderer_render", self, array, len(posed), ct.byref(options), targets)
+        return pictures
 
 
 def _render_options(background: str | Sequence[float], antialiased: bool, context: Context | None) -> vg_render_options:

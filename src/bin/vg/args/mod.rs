@@ -13,9 +13,9 @@ pub(crate) use report::ReportArgs;
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
-use values::{background, picture_size, positive, refinement};
+use values::{backend, background, picture_size, positive, refinement};
 use vg::refine::Amount;
-use vg::render::Background;
+use vg::render::{Backend, Background};
 
 /// Reconstructs a vehicle from posed, masked photographs of one side as metric 3D Gaussians.
 #[derive(Parser)]
@@ -157,6 +157,9 @@ pub(crate) struct RenderArgs {
     /// Write depth too: DIR/depth/<image stem>.png, 16-bit millimetres, 0 = none
     #[arg(long)]
     pub(crate) depth: bool,
+    /// Who draws: the CPU, a graphics processor, or what is best of what this build and this machine have
+    #[arg(long, value_name = "auto|cpu|gpu", default_value = "auto", value_parser = backend)]
+    pub(crate) backend: Backend,
     /// Worker threads; 0 means one per core
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) threads: usize,

@@ -2,7 +2,7 @@
 
 use vg::pipeline::Options;
 use vg::refine::{Amount, RefineOptions};
-use vg::render::Background;
+use vg::render::{Backend, Background};
 
 /// Length, width, height in metres. A type of its own: the parser would take an array for a list of values.
 #[derive(Clone, Copy)]
@@ -25,6 +25,15 @@ pub(super) fn background(text: &str) -> Result<Background, String> {
         other => numbers::<u8>(other)
             .map(|rgb| Background::Color(rgb.map(|c| f32::from(c) / 255.0)))
             .ok_or_else(|| "expected white, black, transparent, or R,G,B with numbers from 0 to 255".into()),
+    }
+}
+
+pub(super) fn backend(text: &str) -> Result<Backend, String> {
+    match text {
+        "auto" => Ok(Backend::Auto),
+        "cpu" => Ok(Backend::Cpu),
+        "gpu" => Ok(Backend::Gpu),
+        _ => Err("expected auto, cpu or gpu".into()),
     }
 }
 

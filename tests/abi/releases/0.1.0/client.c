@@ -381,6 +381,47 @@ static void *draw(void *user) {
     return NULL;
 }
 
+/* Two cameras in one call; the renderer holds on to the Gaussians, which are freed first. */
+static void two_pictures_of_one_renderer(vg_context *context, const vg_gaussians *car, const vg_camera *camera,
+                                         const unsigned char *expected) {
+    static unsigned char drawn[2][WIDTH * HEIGHT * 4];
+    vg_renderer_options settings;
+    vg_render_options options;
+    vg_image_target targets[2];
+    vg_camera cameras[2];
+    vg_gaussians *mirrored = NULL;
+    vg_renderer *renderer = NULL;
+    vg_error *error = NULL;
+    int i;
+
+    CHECK(vg_renderer_options_init(&settings, sizeof settings) == VG_STATUS_OK);
+    CHECK(vg_render_options_init(&options, sizeof options) == VG_STATUS_OK);
+    settings.context = options.context = context;
+    settings.backend = VG_BACKEND_CPU;
+    for (i = 0; i < 2; i++) {
+        CHECK(vg_image_target_init(&targets[i], sizeof targets[i]) == VG_STATUS_OK);
+        targets[i].width = WIDTH;
+        targets[i].height = HEIGHT;
+        targets[i].color = drawn[i];
+        cameras[i] = *camera;
+    }
+    DO(vg_renderer_new(car, &settings, &renderer, &error));
+    CHECK(vg_renderer_backend(renderer) == VG_BACKEND_CPU);
+    CHECK(strstr(vg_renderer_choice(renderer), "asked for") != NULL);
+    DO(vg_renderer_render(renderer, cameras, 2, &options, targets, &error));
+    CHECK(memcmp(drawn[0], expected, sizeof drawn[0]) == 0 && memcmp(drawn[0], drawn[1], sizeof drawn[0]) == 0);
+    targets[1].width = 1;
+    FAILS(vg_renderer_render(renderer, cameras, 2, &options, targets, &error), VG_STATUS_ARGUMENT, "targets[1].size");
+    vg_renderer_free(renderer);
+
+    DO(vg_gaussians_mirror(car, &mirrored, &error));
+    DO(vg_renderer_new(mirrored, &settings, &renderer, &error));
+    vg_gaussians_free(mirrored);
+    DO(vg_renderer_render(renderer, cameras, 1, &options, targets, &error));
+    CHECK(memcmp(drawn[0], expected, sizeof drawn[0]) != 0);
+    vg_renderer_free(renderer);
+}
+
 static void render(const vg_gaussians *car, const vg_camera *photograph, vg_context *context) {
     static unsigned char pictures[CALLERS][HEIGHT * WIDTH * 4], padded[HEIGHT][WIDTH * 4 + 20];
     static float colors[HEIGHT * WIDTH * 4], depth[HEIGHT * WIDTH];
@@ -436,6 +477,7 @@ static void render(const vg_gaussians *car, const vg_camera *photograph, vg_cont
     FAILS(vg_render(car, &camera, &options, &target, &error), VG_STATUS_ARGUMENT, "color_format");
     options.backend = VG_BACKEND_GPU;
     CHECK(vg_render(car, &camera, &options, &target, NULL) != VG_STATUS_OK);
+    two_pictures_of_one_renderer(context, car, &camera, pictures[0]);
 }
 
 enum { SIDE = 32 };

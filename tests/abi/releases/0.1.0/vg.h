@@ -572,7 +572,7 @@ enum vg_backend
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * What is best of what this build and this machine have.
+     * What is best of what this build and this machine have; for a single picture the CPU.
      */
     VG_BACKEND_AUTO = 0,
     /**
@@ -580,7 +580,8 @@ enum vg_backend
      */
     VG_BACKEND_CPU = 1,
     /**
-     * A graphics processor. `VG_STATUS_NOT_BUILT` in a build without it.
+     * A graphics processor, or a driver that stands in for one. `VG_STATUS_NOT_BUILT` in a build without it,
+     * `VG_STATUS_MISSING` on a machine without a driver.
      */
     VG_BACKEND_GPU = 2,
 };
@@ -693,6 +694,12 @@ typedef struct vg_gaussians vg_gaussians;
  * call that uses it has returned; Gaussians and reports do not need it any more.
  */
 typedef struct vg_model vg_model;
+
+/**
+ * Gaussians made ready to be drawn many times: where a graphics processor draws, they are in its memory, and its
+ * kernels are compiled. Any number of threads may use one at a time. Free it with `vg_renderer_free`.
+ */
+typedef struct vg_renderer vg_renderer;
 
 /**
  * What a reconstruction did, how long it took, what it left out, and the error it can know. Owned by the caller,
@@ -1176,7 +1183,8 @@ typedef struct vg_render_options {
      */
     struct vg_context *context;
     /**
-     * A `vg_backend`. Default `VG_BACKEND_AUTO`.
+     * A `vg_backend`. Default `VG_BACKEND_AUTO`. Where pictures follow each other a `vg_renderer` is faster: a graphics
+     * processor is sent the Gaussians once. `vg_render_backward` draws on the CPU alone.
      */
     int32_t backend;
     /**
@@ -1275,6 +1283,29 @@ typedef struct vg_image_target {
      */
     size_t alpha_row_stride;
 } vg_image_target;
+
+/**
+ * Settings of a renderer.
+ */
+typedef struct vg_renderer_options {
+    /**
+     * `sizeof(vg_renderer_options)`.
+     */
+    size_t struct_size;
+    /**
+     * Threads to make ready with. NULL: made for this call, one per core.
+     */
+    struct vg_context *context;
+    /**
+     * A `vg_backend`. Default `VG_BACKEND_AUTO`: a graphics processor where this build and this machine have one and
+     * there are 20,000 Gaussians or more, else the CPU; should the device fail later, the CPU goes on.
+     */
+    int32_t backend;
+    /**
+     * Reserved: 0.
+     */
+    uint32_t flags;
+} vg_renderer_options;
 
 /**
  * Called once on the calling thread when the picture is in `target`; fills the planes that the `vg_image_gradient`
@@ -2150,6 +2181,72 @@ vg_status vg_render(const struct vg_gaussians *gaussians,
                     const struct vg_render_options *options,
                     const struct vg_image_target *target,
                     struct vg_error **out_error);
+
+/**
+ * Sets `*options` to the default values. `size`: `sizeof *options`.
+ */
+VG_API
+vg_status vg_renderer_options_init(struct vg_renderer_options *options,
+                                   size_t size);
+
+/**
+ * Makes Gaussians ready to be drawn many times.
+ *
+ * - gaussians: not NULL. They are shared, not copied, and may be freed before the renderer.
+ * - options: NULL for the default values.
+ * - out: receives the renderer; the caller frees it. NULL on failure.
+ * - out_error: NULL, or receives the error.
+ *
+ * With `VG_BACKEND_GPU`: `VG_STATUS_NOT_BUILT` in a build without it, `VG_STATUS_MISSING` without a driver, and
+ * `VG_STATUS_ARGUMENT` for more Gaussians than the device can take.
+ */
+VG_API
+vg_status vg_renderer_new(const struct vg_gaussians *gaussians,
+                          const struct vg_renderer_options *options,
+                          struct vg_renderer **out,
+                          struct vg_error **out_error);
+
+/**
+ * Draws Gaussians as cameras see them, through their lenses, one picture after the other into the targets.
+ *
+ * - renderer: not NULL.
+ * - cameras: `count` of them, not NULL.
+ * - count: 1 to 4096.
+ * - options: NULL for the default values. `backend` is not looked at: the renderer has one.
+ * - targets: `count` of them, not NULL. The memory they point to is written when its picture is done; the arguments of
+ *   all pictures are checked before the first is drawn.
+ * - out_error: NULL, or receives the error.
+ *
+ * The same arguments give the same bytes with any number of threads on one machine; those of a graphics processor
+ * differ from those of the CPU in the last bits. Colours are sRGB-encoded as everywhere: the numbers that
+ * reconstruction read, blended as they are.
+ */
+VG_API
+vg_status vg_renderer_render(const struct vg_renderer *renderer,
+                             const struct vg_camera *cameras,
+                             size_t count,
+                             const struct vg_render_options *options,
+                             const struct vg_image_target *targets,
+                             struct vg_error **out_error);
+
+/**
+ * Who draws: `VG_BACKEND_CPU` or `VG_BACKEND_GPU`. NULL: `VG_BACKEND_AUTO`.
+ */
+VG_API
+int32_t vg_renderer_backend(const struct vg_renderer *renderer);
+
+/**
+ * Who draws, and why, in one line of UTF-8: "cpu (avx2+fma): graphics processor: no Vulkan driver; ...". Lives as long as
+ * the renderer. NULL: an empty string. Never NULL.
+ */
+VG_API
+const char *vg_renderer_choice(const struct vg_renderer *renderer);
+
+/**
+ * Frees a renderer. Texts of it end. NULL: nothing happens.
+ */
+VG_API
+void vg_renderer_free(struct vg_renderer *renderer);
 
 /**
  * Sets `*gradient` to one without planes. `size`: `sizeof *gradient`.
