@@ -474,11 +474,11 @@ def test_the_environment_variable_names_the_library(tmp_path: Path) -> None:
     assert ran.stdout.split() == [str(copy), str(copy), vg.__version__]
 
 
-def test_a_renderer_draws_several_pictures_of_one_call(made: vg.Reconstruction, views: Views) -> None:
+def test_a_renderer_draws_several_pictures_of_one_call(made: vg.Reconstruction, ellipsoid: Views) -> None:
     g = made.gaussians
     copy = capi.Gaussians.from_arrays(g.means, g.scales, g.quats, g.opacities, g.sh)
     ready = capi.Renderer(copy, "cpu")
-    cameras = [views.cameras[0], views.cameras[0]]
+    cameras = [ellipsoid.cameras[0], ellipsoid.cameras[0]]
     expected = g.render(cameras[0])
     del copy
     gc.collect()

@@ -225,15 +225,15 @@ def test_a_lens_bends_the_picture(made: vg.Reconstruction, ellipsoid: Views) -> 
     assert 0.5 < areas[1] / areas[0] < 0.99
 
 
-def test_a_renderer_draws_the_same_and_says_who_did(made: vg.Reconstruction, views: Views) -> None:
-    camera = views.cameras[0]
+def test_a_renderer_draws_the_same_and_says_who_did(made: vg.Reconstruction, ellipsoid: Views) -> None:
+    camera = ellipsoid.cameras[0]
     ready = vg.Renderer(made.gaussians, "cpu")
     assert ready.backend == "cpu" and "asked for" in ready.choice and "cpu" in repr(ready)
     for background in ("white", "transparent"):
         expected = made.gaussians.render(camera, background)
         np.testing.assert_array_equal(ready.render(camera, background), expected)
     assert vg.Renderer(made.gaussians).backend in ("cpu", "gpu")
-    with pytest.raises(vg.VgError, match="backend: 'cuda'; allowed: auto, cpu or gpu"):
+    with pytest.raises(vg.VgError, match='backend: "cuda"; allowed: auto, cpu or gpu'):
         vg.Renderer(made.gaussians, "cuda")  # type: ignore[arg-type]
     with pytest.raises(vg.VgError, match="gpu is not in this build|graphics processor"):
         raise_unless_gpu(made.gaussians)

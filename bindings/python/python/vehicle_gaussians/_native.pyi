@@ -12,6 +12,7 @@ __all__ = [
     "Camera",
     "Gaussians",
     "Model",
+    "Renderer",
     "__version__",
     "_panic_on_a_worker_thread",
     "align_box",
@@ -80,7 +81,7 @@ class Camera:
 
 @final
 class Renderer:
-    def __init__(self, gaussians: Gaussians, backend: Literal["auto", "cpu", "gpu"] = "auto") -> None: ...
+    def __new__(cls, gaussians: Gaussians, backend: Literal["auto", "cpu", "gpu"] = "auto") -> Renderer: ...
     @property
     def backend(self) -> str: ...
     @property

@@ -242,13 +242,14 @@ static vg_gaussians *reconstruct(vg_context *context, const vg_view *views, size
     options.context = context;
     options.points = 1;
     options.check = !quick;
+    options.resolution = quick ? 0.5 : 1;
     options.progress = on_progress;
     options.progress_user = &heard;
     options.log = on_log;
     options.log_user = &heard;
     DO(vg_reconstruct(views, count, &options, &car, &report, &error));
     CHECK(heard.calls >= 6 && heard.last_fraction >= 0 && heard.last_fraction <= 1 && heard.lines > 6);
-    CHECK(vg_gaussians_count(car) > 10000 && vg_gaussians_sh_degree(car) == 2);
+    CHECK(vg_gaussians_count(car) > (quick ? 3000 : 10000) && vg_gaussians_sh_degree(car) == 2);
 
     CHECK(vg_report_figures_init(&figures, sizeof figures) == VG_STATUS_OK);
     DO(vg_report_get_figures(report, &figures, &error));
@@ -271,7 +272,7 @@ static vg_gaussians *reconstruct(vg_context *context, const vg_view *views, size
     options.progress = NULL;
     CHECK(options.calibrate == VG_CALIBRATE_AUTO && options.relight == VG_RELIGHT_AUTO && options.photo == 1);
     CHECK(options.budget_s == 0 && options.cloud == NULL && options.cloud_count == 0);
-    CHECK(options.resolution == 1 && options.max_views == 0);
+    CHECK(options.resolution == (quick ? 0.5 : 1) && options.max_views == 0);
     CHECK(options.refine_seconds == 0 && options.refine_iterations == 0 && options.refine_hold_out == 0);
     options.refine_seconds = 1;
     options.refine_iterations = 2;
