@@ -18,6 +18,18 @@ use vg::render::{Background, CpuRenderer, DepthMode, Differentiable, Gradients, 
 use vg::render::{Reference, RenderOptions, Rendered, Renderer};
 use vg::{Camera, Gaussians, Pose};
 
+/// The renderers that are fast: the CPU's two, and the graphics processor's where it is built and there is one.
+fn renderers() -> Vec<(&'static str, Box<dyn Differentiable>)> {
+    let mut out: Vec<(&str, Box<dyn Differentiable>)> =
+        vec![("vector", Box::new(CpuRenderer::new())), ("portable", Box::new(CpuRenderer::portable()))];
+    #[cfg(feature = "gpu")]
+    if let Some(gpu) = common::gpu::renderer() {
+        out.push(("gpu", Box::new(gpu)));
+    }
+    out.reverse();
+    out
+}
+
 /// |a - b| / |b| as vectors.
 fn relative_l2(found: &[f64], expected: &[f64]) -> f64 {
     assert_eq!(found.len(), expected.len());
@@ -80,7 +92,7 @@ fn golden_weights(npz: &Npz, camera: &Camera, plane: &str) -> PictureGradient {
     gradient
 }
 
-fn check_golden(name: &str, renderer: &impl Differentiable, tolerance: f64) {
+fn check_golden(name: &str, renderer: &dyn Differentiable, tolerance: f64) {
     let Some(folder) = golden() else { return };
     let mut failures = Vec::new();
     for file in ["grad_colors_300", "grad_sh_300", "grad_antialiased_200"] {
@@ -105,8 +117,9 @@ fn check_golden(name: &str, renderer: &impl Differentiable, tolerance: f64) {
 
 #[test]
 fn the_gradients_agree_with_gsplats_autograd_to_1e_4_of_each_tensor() {
-    check_golden("avx2", &CpuRenderer::new(), 1e-4);
-    check_golden("portable", &CpuRenderer::portable(), 1e-4);
+    for (name, renderer) in renderers() {
+        check_golden(name, &*renderer, 1e-4);
+    }
 }
 
 #[test]
@@ -120,7 +133,7 @@ const SCENES: u64 = 200;
 #[test]
 fn gradients_of_200_stiff_scenes_agree_with_the_reference_to_1e_4_of_each_tensors_largest() {
     let mut worst: Vec<(f64, String)> = Vec::new();
-    for (level, renderer) in [("vector", CpuRenderer::new()), ("portable", CpuRenderer::portable())] {
+    for (level, renderer) in renderers() {
         for seed in 0..SCENES {
             let Stiff { gaussians, camera, options, gradient } = stiff(seed);
             let found = renderer.backward(&gaussians, &camera, &options, &gradient).unwrap();
@@ -236,22 +249,23 @@ fn reused_memory_gives_the_bytes_that_new_memory_gives() {
 fn a_loss_that_is_flat_and_a_scene_that_is_empty_have_zero_gradients() {
     let camera = looking_at_origin(50, 40, DVec3::X, 5.0);
     let options = RenderOptions::default();
-    let renderer = CpuRenderer::new();
     let gaussians = random(2, 100, 2, [0.02, 0.2]);
     let absent = PictureGradient { width: 50, height: 40, ..PictureGradient::default() };
-    for flat in [PictureGradient::zeros(50, 40), absent] {
-        let g = renderer.backward(&gaussians, &camera, &options, &flat).unwrap();
-        assert_eq!(g.means, vec![[0.0; 3]; 100]);
-        assert!(g.sh.len() == 2700 && g.sh.iter().all(|&v| v == 0.0));
-        assert_eq!((g.background, g.pose), ([0.0; 3], vg::render::PoseGradient::default()));
+    for (_, renderer) in renderers() {
+        for flat in [PictureGradient::zeros(50, 40), absent.clone()] {
+            let g = renderer.backward(&gaussians, &camera, &options, &flat).unwrap();
+            assert_eq!(g.means, vec![[0.0; 3]; 100]);
+            assert!(g.sh.len() == 2700 && g.sh.iter().all(|&v| v == 0.0));
+            assert_eq!((g.background, g.pose), ([0.0; 3], vg::render::PoseGradient::default()));
+        }
+        let mut ones = PictureGradient::zeros(50, 40);
+        ones.color_mut().fill([1.0, 2.0, 3.0]);
+        let g = renderer.backward(&Gaussians::default(), &camera, &options, &ones).unwrap();
+        assert_eq!((g.means.len(), g.background), (0, [2000.0, 4000.0, 6000.0]));
+        let transparent = RenderOptions { background: Background::Transparent, ..options };
+        let g = renderer.backward(&Gaussians::default(), &camera, &transparent, &ones).unwrap();
+        assert_eq!(g.background, [0.0; 3]);
     }
-    let mut ones = PictureGradient::zeros(50, 40);
-    ones.color_mut().fill([1.0, 2.0, 3.0]);
-    let g = renderer.backward(&Gaussians::default(), &camera, &options, &ones).unwrap();
-    assert_eq!((g.means.len(), g.background), (0, [2000.0, 4000.0, 6000.0]));
-    let transparent = RenderOptions { background: Background::Transparent, ..options };
-    let g = renderer.backward(&Gaussians::default(), &camera, &transparent, &ones).unwrap();
-    assert_eq!(g.background, [0.0; 3]);
 }
 
 #[test]
@@ -272,7 +286,7 @@ fn gradients_that_do_not_fit_the_picture_are_refused_by_name() {
     cases.push((PictureGradient::zeros(8, 10), "gradient.size: 8x10".to_owned()));
     cases.push((PictureGradient { alpha: vec![0.0; 79], ..zeros }, "gradient.alpha: 79 entries".to_owned()));
     for (gradient, expected) in cases {
-        for renderer in [&CpuRenderer::new() as &dyn Differentiable, &Reference] {
+        for renderer in renderers().iter().map(|r| &*r.1).chain([&Reference as &dyn Differentiable]) {
             let error = renderer.backward(&gaussians, &camera, &options, &gradient).unwrap_err().to_string();
             assert!(error.starts_with(&expected), "{error}");
         }
@@ -314,12 +328,14 @@ fn a_hundred_thousand_layers_that_hardly_show_agree_with_the_reference() {
     let p = Parameters::new(&gaussians, &camera, &options).unwrap();
     let deepest = Reference.cuts(&p, &options).depth_complexity().max().unwrap();
     assert!((2_000..2_345).contains(&deepest), "{deepest} layers");
-    let found = CpuRenderer::new().backward(&gaussians, &camera, &options, &gradient).unwrap();
     let exact = Reference.backward_f64(&gaussians, &camera, &options, &gradient).unwrap();
-    for (name, found, exact) in tensors(&found, &exact, &camera) {
-        let error = largest(&found.iter().zip(&exact).map(|(a, b)| a - b).collect::<Vec<f64>>());
-        println!("{name:12} {error:.1e} of {:.1e}", largest(&exact));
-        assert!(error <= 1e-3 * largest(&exact), "{name}: {error:e} of {:e}", largest(&exact));
+    for (level, renderer) in renderers() {
+        let found = renderer.backward(&gaussians, &camera, &options, &gradient).unwrap();
+        for (name, found, exact) in tensors(&found, &exact, &camera) {
+            let error = largest(&found.iter().zip(&exact).map(|(a, b)| a - b).collect::<Vec<f64>>());
+            println!("{level:8} {name:12} {error:.1e} of {:.1e}", largest(&exact));
+            assert!(error <= 1e-3 * largest(&exact), "{level} {name}: {error:e} of {:e}", largest(&exact));
+        }
     }
 }
 
@@ -341,6 +357,7 @@ fn extreme_numbers_give_finite_gradients() {
     let gaussians = Gaussians::from_arrays(3, means, rotations, scales, opacities, sh).unwrap();
     let mut narrow = camera;
     narrow.intrinsics.fx = 1e9;
+    let renderers = renderers();
     for camera in [camera, narrow] {
         for magnitude in [1e-38, 1.0, f32::MAX] {
             for antialiased in [false, true] {
@@ -349,9 +366,11 @@ fn extreme_numbers_give_finite_gradients() {
                 for plane in [gradient.color.as_flattened_mut(), &mut gradient.alpha, &mut gradient.depth] {
                     plane.iter_mut().for_each(|v| *v = v.signum() * magnitude);
                 }
-                let g = CpuRenderer::new().backward(&gaussians, &camera, &options, &gradient).unwrap();
-                assert!(all_finite(&g), "{magnitude:e}, antialiased {antialiased}");
-                assert!(g.sh.iter().any(|&v| v != 0.0));
+                for (level, renderer) in &renderers {
+                    let g = renderer.backward(&gaussians, &camera, &options, &gradient).unwrap();
+                    assert!(all_finite(&g), "{level}: {magnitude:e}, antialiased {antialiased}");
+                    assert!(g.sh.iter().any(|&v| v != 0.0), "{level}: {magnitude:e}");
+                }
             }
         }
     }
@@ -370,34 +389,35 @@ fn gradients_through_a_lens_are_central_differences_of_the_pictures() {
     };
     for depth_mode in [DepthMode::Accumulated, DepthMode::Expected] {
         let options = RenderOptions { depth_mode, ..RenderOptions::default() };
-        let renderer = CpuRenderer::new();
-        // Smooth weights that are zero at the rim.
-        let weigh = |p: &Rendered| {
-            let mut g = PictureGradient::zeros(p.width, p.height);
-            for (i, &a) in p.alpha.iter().enumerate() {
-                let w = if a > 0.1 { ((i % 60) as f32 * 0.2).sin() } else { 0.0 };
-                (g.color[i], g.alpha[i], g.depth[i]) = ([w, 0.5 * w, -w], w, 0.3 * w);
-            }
-            g
-        };
-        let weights = weigh(&renderer.render(&at(0.1), &camera, &options).unwrap());
-        let loss = |z: f32| {
-            let p = renderer.render(&at(z), &camera, &options).unwrap();
-            let dot = |a: &[f32], b: &[f32]| {
-                a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum::<f64>()
+        for (level, renderer) in renderers() {
+            // Smooth weights that are zero at the rim.
+            let weigh = |p: &Rendered| {
+                let mut g = PictureGradient::zeros(p.width, p.height);
+                for (i, &a) in p.alpha.iter().enumerate() {
+                    let w = if a > 0.1 { ((i % 60) as f32 * 0.2).sin() } else { 0.0 };
+                    (g.color[i], g.alpha[i], g.depth[i]) = ([w, 0.5 * w, -w], w, 0.3 * w);
+                }
+                g
             };
-            dot(p.color.as_flattened(), weights.color.as_flattened())
-                + dot(&p.alpha, &weights.alpha)
-                + dot(&p.depth, &weights.depth)
-        };
-        let h = 0.004;
-        let difference = (loss(0.1 + h) - loss(0.1 - h)) / f64::from((0.1 + h) - (0.1 - h));
-        let g = renderer.backward(&at(0.1), &camera, &options, &weights).unwrap();
-        let found = f64::from(g.means[0][2]);
-        println!("{depth_mode:?}: {found} against {difference}");
-        assert!((found - difference).abs() < 2e-3 * difference.abs().max(1.0), "{found} {difference}");
-        let by_reference = Reference.backward(&at(0.1), &camera, &options, &weights).unwrap();
-        assert!((g.means[0][2] - by_reference.means[0][2]).abs() < 1e-3 * by_reference.means[0][2].abs());
+            let weights = weigh(&renderer.render(&at(0.1), &camera, &options).unwrap());
+            let loss = |z: f32| {
+                let p = renderer.render(&at(z), &camera, &options).unwrap();
+                let dot = |a: &[f32], b: &[f32]| {
+                    a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum::<f64>()
+                };
+                dot(p.color.as_flattened(), weights.color.as_flattened())
+                    + dot(&p.alpha, &weights.alpha)
+                    + dot(&p.depth, &weights.depth)
+            };
+            let h = 0.004;
+            let difference = (loss(0.1 + h) - loss(0.1 - h)) / f64::from((0.1 + h) - (0.1 - h));
+            let g = renderer.backward(&at(0.1), &camera, &options, &weights).unwrap();
+            let found = f64::from(g.means[0][2]);
+            println!("{level} {depth_mode:?}: {found} against {difference}");
+            assert!((found - difference).abs() < 2e-3 * difference.abs().max(1.0), "{found} {difference}");
+            let by_reference = Reference.backward(&at(0.1), &camera, &options, &weights).unwrap();
+            assert!((g.means[0][2] - by_reference.means[0][2]).abs() < 1e-3 * by_reference.means[0][2].abs());
+        }
     }
 }
 

@@ -123,6 +123,21 @@ impl LensMap {
         });
     }
 
+    /// A loss of the lens's picture as one of the pinhole picture `fine`, whose gradient it leaves in `of_fine`. Returns the
+    /// gradient of the background.
+    pub(super) fn loss(
+        &self,
+        options: &RenderOptions,
+        (fine, of_fine): (&Rendered, &mut PictureGradient),
+        (picture, of_picture): (&mut Rendered, &mut PictureGradient),
+        loss: impl FnOnce(&Rendered, &mut PictureGradient) -> Result<f32>,
+    ) -> Result<[f64; 3]> {
+        self.resample(fine, options, picture);
+        loss(picture, of_picture)?;
+        of_fine.reset(fine);
+        Ok(self.scatter(picture, options, of_picture, of_fine))
+    }
+
     /// The adjoint of [`LensMap::resample`]: the gradient of the lens's picture scattered with the weights it was
     /// read with. `picture` is the lens's. Returns the gradient of the background.
     ///

@@ -51,14 +51,10 @@ pub(super) fn color(sh: &[f32], basis: &[f32; 16], coefficients: usize) -> [f32;
     rgb
 }
 
-/// `gradient` where `color` moves with its coefficients: not at 0 and not at [`MAX_COLOR`], where it is cut.
+/// Whether each channel moves with its coefficients: not at 0 and not at [`MAX_COLOR`], where it is cut.
 #[inline(always)]
-pub(super) fn gate(color: [f32; 3], gradient: [f64; 3]) -> [f64; 3] {
-    let mut out = [0.0; 3];
-    for c in 0..3 {
-        out[c] = if color[c] > 0.0 && color[c] < MAX_COLOR { gradient[c] } else { 0.0 };
-    }
-    out
+pub(super) fn moves(color: [f32; 3]) -> [bool; 3] {
+    color.map(|v| v > 0.0 && v < MAX_COLOR)
 }
 
 #[cfg(test)]

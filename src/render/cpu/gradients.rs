@@ -69,16 +69,36 @@ impl CpuRenderer {
         let (mut fine_picture, mut of_fine) = (Rendered::default(), PictureGradient::default());
         let mut background = [0.0; 3];
         let through_lens = |fine: &Rendered, of_fine: &mut PictureGradient| {
-            map.resample(fine, options, picture);
-            largest(picture, of_picture)?;
-            of_fine.reset(fine);
-            background = map.scatter(picture, options, of_picture, of_fine);
+            background = map.loss(options, (fine, &mut *of_fine), (picture, of_picture), largest)?;
             of_fine.validate(&pinhole)
         };
         let targets = (&mut fine_picture, &mut of_fine, &mut *gradients);
         self.pinhole_both_ways(gaussians, &pinhole, &fine, targets, through_lens)?;
         gradients.background = background;
         Ok(GradientTimes::default())
+    }
+
+    /// The way back from what pixels have for each Gaussian, where they were drawn and summed up elsewhere; the
+    /// camera is valid and has no lens.
+    #[cfg(feature = "gpu")]
+    pub(in crate::render) fn from_pixels(
+        &self,
+        gaussians: &Gaussians,
+        camera: &Camera,
+        options: &RenderOptions,
+        shares: &backward::Shares,
+        decided: impl Fn(usize) -> backward::Decided + Sync,
+        out: &mut Gradients,
+    ) {
+        match self.level {
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2(simd) => {
+                backward::from_pixels(simd, gaussians, camera, options, shares, decided, out);
+            }
+            Level::Portable(simd) => {
+                backward::from_pixels(simd, gaussians, camera, options, shares, decided, out);
+            }
+        }
     }
 
     /// Of a valid camera without a lens; `loss` as in [`both_ways`].

@@ -4,7 +4,7 @@
 //! It runs in the rayon pool it is called from and draws the same bytes with any number of threads.
 //! `docs/RENDERER.md` has the measurements behind each choice.
 
-mod backward;
+pub(super) mod backward;
 mod bin;
 mod blend;
 mod color;

@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::gaussians::{Gaussians, sh};
 use crate::geometry::Camera;
 use glam::DVec3;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Floats of a Gaussian without its colour: mean, quaternion, standard deviations, opacity.
 const SHAPE: usize = 11;
@@ -14,6 +15,8 @@ const SHAPE: usize = 11;
 /// Gaussians in the memory of a [`GpuRenderer`](super::GpuRenderer)'s device.
 #[derive(Debug)]
 pub struct GpuAsset {
+    /// No other has it in this process.
+    pub(super) id: u64,
     pub(super) count: usize,
     pub(super) sh_degree: u8,
     pub(super) chunks: Vec<Chunk>,
@@ -70,7 +73,9 @@ impl GpuAsset {
             let _ = device.device.poll(wgpu::PollType::wait_indefinitely());
             device.check()?;
         }
-        Ok(Self { count: gaussians.len(), sh_degree: gaussians.sh_degree(), chunks, low, high })
+        static MADE: AtomicU64 = AtomicU64::new(0);
+        let id = MADE.fetch_add(1, Ordering::Relaxed);
+        Ok(Self { id, count: gaussians.len(), sh_degree: gaussians.sh_degree(), chunks, low, high })
     }
 
     /// How many Gaussians there are.

@@ -8,7 +8,7 @@ use crate::render::{Background, DepthMode, RenderOptions};
 
 /// As `Frame` in the shaders, field by field.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub(super) struct Frame {
     rotation: [[f32; 4]; 3],
     rotation_rest: [[f32; 4]; 3],
@@ -38,6 +38,10 @@ pub(super) struct Frame {
     pub(super) is_first: u32,
     pub(super) is_last: u32,
     first_key: u32,
+    pub(super) first_tile_column: u32,
+    pub(super) band_row: u32,
+    pub(super) first_pair: u32,
+    pub(super) held_pairs: u32,
 }
 
 /// Pixels along a tile's side, as in the shaders.
@@ -83,7 +87,30 @@ impl Frame {
             is_first: 1,
             is_last: 1,
             first_key: depths[0].to_bits(),
+            first_tile_column: 0,
+            band_row: 0,
+            first_pair: 0,
+            held_pairs: 0,
         }
+    }
+
+    /// What the lists of pairs of a whole window depend on.
+    pub(super) fn of_lists(&self) -> Self {
+        Self {
+            slice_start: 0,
+            pair_capacity: 0,
+            is_first: 1,
+            is_last: 1,
+            band_row: 0,
+            first_pair: 0,
+            held_pairs: 0,
+            ..*self
+        }
+    }
+
+    /// What splats and their order depend on.
+    pub(super) fn of_splats(&self) -> Self {
+        Self { tile_columns: 0, first_tile_column: 0, first_tile_row: 0, tile_rows: 0, ..self.of_lists() }
     }
 }
 

@@ -14,10 +14,14 @@ pub(super) struct Kernels {
     pub(super) emit: wgpu::ComputePipeline,
     pub(super) find_ranges: wgpu::ComputePipeline,
     pub(super) blend: wgpu::ComputePipeline,
+    pub(super) back: wgpu::ComputePipeline,
+    pub(super) gather: wgpu::ComputePipeline,
 }
 
 /// What several shaders begin with.
 const FRAME: &str = include_str!("shaders/frame.wgsl");
+/// What both directions of blending begin with.
+const ALPHA: &str = include_str!("shaders/alpha.wgsl");
 
 impl Kernels {
     pub(super) fn new(device: &Device) -> Self {
@@ -40,6 +44,7 @@ impl Kernels {
                 cache: None,
             })
         };
+        let blending = |name: &str, source: &str| module(name, &format!("{ALPHA}\n{source}"));
         let scan = module("scan", include_str!("shaders/scan.wgsl"));
         let sort = module("sort", include_str!("shaders/sort.wgsl"));
         let tiles = module("tiles", include_str!("shaders/tiles.wgsl"));
@@ -52,7 +57,9 @@ impl Kernels {
             cover: pipeline(&tiles, "cover"),
             emit: pipeline(&tiles, "emit"),
             find_ranges: pipeline(&module("ranges", include_str!("shaders/ranges.wgsl")), "find"),
-            blend: pipeline(&module("blend", include_str!("shaders/blend.wgsl")), "blend"),
+            blend: pipeline(&blending("blend", include_str!("shaders/blend.wgsl")), "blend"),
+            back: pipeline(&blending("back", include_str!("shaders/back.wgsl")), "back"),
+            gather: pipeline(&module("gather", include_str!("shaders/gather.wgsl")), "gather"),
         }
     }
 }

@@ -150,6 +150,48 @@ pub(super) struct PerBand {
     pub(super) readback: wgpu::Buffer,
 }
 
+/// What the way back needs.
+#[derive(Debug)]
+pub(super) struct Back {
+    /// Of a band's pixels, as many as it has room for.
+    pub(super) gradient: wgpu::Buffer,
+    /// Of a window's tiles.
+    pub(super) backgrounds: wgpu::Buffer,
+    pub(super) backgrounds_readback: wgpu::Buffer,
+    /// Of pairs.
+    pub(super) shares: wgpu::Buffer,
+    pub(super) sums: Vec<SplatSums>,
+}
+
+/// Sums of Gaussians that follow each other.
+#[derive(Debug)]
+pub(super) struct SplatSums {
+    pub(super) count: usize,
+    /// Number of the first Gaussian, and the count.
+    pub(super) range: wgpu::Buffer,
+    pub(super) sums: wgpu::Buffer,
+    pub(super) readback: wgpu::Buffer,
+}
+
+impl Back {
+    fn bytes(&self) -> u64 {
+        let sums: u64 = self.sums.iter().map(|s| s.sums.size() + s.readback.size()).sum();
+        self.gradient.size() + 2 * self.backgrounds.size() + self.shares.size() + sums
+    }
+}
+
+impl SplatSums {
+    fn new(device: &Device, first: usize, count: usize) -> Self {
+        let bytes = SUMS * count as u64;
+        Self {
+            count,
+            range: uniform(device, "sums' range", bytemuck::cast_slice(&[first as u32, count as u32, 0, 0])),
+            sums: storage(device, "sums", bytes),
+            readback: readable(device, "sums to read", bytes),
+        }
+    }
+}
+
 /// Numbers of which there is one.
 #[derive(Debug)]
 pub(super) struct Counters {
@@ -168,6 +210,15 @@ pub(super) struct Counters {
 pub(super) const PIXEL: u64 = 20;
 /// Bytes of a splat.
 pub(super) const SPLAT: u64 = 32;
+/// Bytes that a pair has for its splat: `shares` of `shaders/back.wgsl`.
+pub(super) const SHARE: u64 = 40;
+/// Bytes of a splat's sums: `sums` of `shaders/gather.wgsl`.
+pub(super) const SUMS: u64 = 44;
+/// Bytes of a tile's gradient of the background.
+pub(super) const BACKGROUND: u64 = 16;
+
+/// What a frame is drawn of: the asset's id, and what of the frame matters.
+pub(super) type Made = (u64, Frame);
 
 /// All of it.
 #[derive(Debug)]
@@ -176,6 +227,11 @@ pub(super) struct Memory {
     pub(super) gaussian: Option<PerGaussian>,
     pub(super) pair: Option<PerPair>,
     pub(super) band: Option<PerBand>,
+    pub(super) back: Option<Back>,
+    /// Whose splats are there, in their order.
+    pub(super) splats_of: Option<Made>,
+    /// Whose pairs are listed, all of a window's, and how many there are.
+    pub(super) pairs_of: Option<(Made, u32)>,
 }
 
 impl Memory {
@@ -187,7 +243,7 @@ impl Memory {
             unfinished: words(device, "unfinished", 1),
             readback: readable(device, "counters", 12),
         };
-        Self { counters, gaussian: None, pair: None, band: None }
+        Self { counters, gaussian: None, pair: None, band: None, back: None, splats_of: None, pairs_of: None }
     }
 
     /// Room for at least `count` Gaussians.
@@ -197,6 +253,7 @@ impl Memory {
         }
         // What was there goes first.
         self.gaussian = None;
+        (self.splats_of, self.pairs_of) = (None, None);
         self.gaussian = Some(PerGaussian {
             splats: storage(device, "splats", SPLAT * count),
             tints: storage(device, "tints", 16 * count),
@@ -211,6 +268,7 @@ impl Memory {
             return;
         }
         self.pair = None;
+        self.pairs_of = None;
         self.pair = Some(PerPair {
             tiles: Entries::new(device, "tiles", count),
             splats: words(device, "pair splats", count),
@@ -224,9 +282,51 @@ impl Memory {
             return;
         }
         self.band = None;
+        self.pairs_of = None;
         let picture = storage(device, "picture", PIXEL * pixels);
         let readback = readable(device, "picture to read", picture.size());
         self.band = Some(PerBand { ranges: storage(device, "ranges", 8 * tiles), picture, readback });
+    }
+
+    /// Room to go back with `count` Gaussians and at least so many tiles and pixels of a band.
+    pub(super) fn for_back(
+        &mut self,
+        device: &Device,
+        count: usize,
+        [tiles, pixels]: [u64; 2],
+        largest_binding: u64,
+    ) {
+        let fits = |b: &Back| {
+            b.gradient.size() >= PIXEL * pixels
+                && b.backgrounds.size() >= BACKGROUND * tiles
+                && b.sums.iter().map(|s| s.count).sum::<usize>() == count
+        };
+        if self.back.as_ref().is_some_and(fits) {
+            return;
+        }
+        self.back = None;
+        let backgrounds = storage(device, "backgrounds", BACKGROUND * tiles);
+        let backgrounds_readback = readable(device, "backgrounds to read", backgrounds.size());
+        let each = ((largest_binding / SUMS) as usize).max(1);
+        let sums = (0..count).step_by(each).map(|i| SplatSums::new(device, i, each.min(count - i))).collect();
+        self.back = Some(Back {
+            gradient: storage(device, "gradient", PIXEL * pixels),
+            backgrounds,
+            backgrounds_readback,
+            shares: storage(device, "shares", SHARE),
+            sums,
+        });
+    }
+
+    /// Room for the shares of `pairs` of them, or of as many as fit in a binding, once there is room to go back.
+    pub(super) fn for_shares(&mut self, device: &Device, pairs: u64, largest_binding: u64) {
+        let Some(back) = &mut self.back else { return };
+        let bytes = SHARE * pairs.min(largest_binding / SHARE).max(1);
+        if back.shares.size() < bytes {
+            // What was there goes first.
+            back.shares.destroy();
+            back.shares = storage(device, "shares", bytes);
+        }
     }
 
     /// What it takes on the device, bytes.
@@ -237,6 +337,7 @@ impl Memory {
             .map_or(0, |g| g.splats.size() + g.tints.size() + g.depths.bytes() + g.offsets.bytes());
         let pair = self.pair.as_ref().map_or(0, |p| p.tiles.bytes() + p.splats.size());
         let band = self.band.as_ref().map_or(0, |b| b.ranges.size() + 2 * b.picture.size());
-        gaussian + pair + band
+        let back = self.back.as_ref().map_or(0, Back::bytes);
+        gaussian + pair + band + back
     }
 }

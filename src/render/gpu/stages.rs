@@ -1,10 +1,13 @@
 //! The stages of a picture as commands for the device.
 
+use super::MOST_GROUPS;
 use super::asset::GpuAsset;
 use super::device::Device;
 use super::frame::Frame;
 use super::kernels::Kernels;
-use super::memory::{Counters, DIGIT_BITS, Entries, PIXEL, PerBand, PerGaussian, PerPair, Sums};
+use super::memory::{
+    BACKGROUND, Back, Counters, DIGIT_BITS, Entries, PIXEL, PerBand, PerGaussian, PerPair, SUMS, Sums,
+};
 
 /// Commands on their way to the device.
 pub(super) struct Stages<'a> {
@@ -118,6 +121,70 @@ impl<'a> Stages<'a> {
             (7, &counters.unfinished),
         ];
         self.run(&self.kernels.blend, &bindings, [frame.tile_columns, frame.tile_rows]);
+    }
+
+    /// Walks the window's tiles back, for the pairs that are held, and adds what they have for each splat to its sums.
+    pub(super) fn back(
+        &mut self,
+        frame: &Frame,
+        counters: &Counters,
+        per: &PerGaussian,
+        pair: &PerPair,
+        band: &PerBand,
+        back: &Back,
+        [depth_bits, tile_bits]: [u32; 2],
+    ) {
+        let bindings = [
+            (0, &counters.frame),
+            (1, &band.ranges),
+            (2, sorted(&pair.tiles, tile_bits)),
+            (3, &pair.splats),
+            (4, &per.splats),
+            (5, &per.tints),
+            (6, &back.gradient),
+            (7, &back.shares),
+            (8, &back.backgrounds),
+        ];
+        self.run(&self.kernels.back, &bindings, [frame.tile_columns, frame.tile_rows]);
+        for chunk in &back.sums {
+            let bindings = [
+                (0, &counters.frame),
+                (1, &chunk.range),
+                (2, per.depths.histogram.total()),
+                (3, sorted(&per.depths, depth_bits)),
+                (4, &per.offsets.values),
+                (5, &back.shares),
+                (6, &per.splats),
+                (7, &per.tints),
+                (8, &chunk.sums),
+            ];
+            let threads = 11 * per.depths.capacity;
+            self.run(&self.kernels.gather, &bindings, [threads.div_ceil(256).min(MOST_GROUPS) as u32, 1]);
+        }
+    }
+
+    /// Makes ready for the processor what the window's tiles have for the background.
+    pub(super) fn read_backgrounds(&mut self, back: &Back, tiles: u64) {
+        self.close();
+        let to = &back.backgrounds_readback;
+        self.encoder.copy_buffer_to_buffer(&back.backgrounds, 0, to, 0, BACKGROUND * tiles);
+    }
+
+    /// Sums of zero.
+    pub(super) fn clear_sums(&mut self, back: &Back) {
+        self.close();
+        for chunk in &back.sums {
+            self.encoder.clear_buffer(&chunk.sums, 0, None);
+        }
+    }
+
+    /// Makes the sums ready for the processor.
+    pub(super) fn read_sums(&mut self, back: &Back) {
+        self.close();
+        for chunk in &back.sums {
+            let bytes = SUMS * chunk.count as u64;
+            self.encoder.copy_buffer_to_buffer(&chunk.sums, 0, &chunk.readback, 0, bytes);
+        }
     }
 
     /// Makes ready for the processor how the slice went and, where it was the last, the band's `pixels`.

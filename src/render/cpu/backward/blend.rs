@@ -26,7 +26,7 @@ use pulp::f32x8;
 /// Where a pixel is drawn q < 8, so all of these are of the size of w.
 ///
 /// `[w, w t, w s, w t t, w t s, w s s, red, green, blue, depth]`
-pub(super) type SplatSums = [f32; 10];
+pub(in crate::render) type SplatSums = [f32; 10];
 
 /// The gradient of eight pixels, and what lies behind the layer at hand.
 #[derive(Clone, Copy, Debug)]

@@ -19,8 +19,10 @@ use crate::gaussians::Gaussians;
 use crate::geometry::Camera;
 use crate::render::view::PinholeView;
 use crate::render::{Gradients, PictureGradient, PoseGradient, RenderOptions};
-use blend::{SplatSums, TileGradient};
+pub(in crate::render) use blend::SplatSums;
+use blend::TileGradient;
 use glam::{DMat3, DVec3};
+pub(in crate::render) use project::Decided;
 use project::{CameraSums, Chunk};
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
@@ -85,7 +87,6 @@ pub(super) fn backward<S: Lanes>(
     out: &mut Gradients,
 ) -> BackwardTimes {
     let scale = scale_of(largest);
-    let view = PinholeView::new(camera, options, gaussians.sh_degree());
     let grid = Grid::new(camera.width, camera.height);
     let Scratch { splats, order, bounds, stripes, backward, .. } = scratch;
     let BackwardScratch { tiles, sums, workers } = backward;
@@ -114,16 +115,40 @@ pub(super) fn backward<S: Lanes>(
     }
 
     let start = Instant::now();
-    let unscale = 1.0 / scale;
-    let total = project_all(simd, &view, gaussians, splats, sums, unscale, out);
-    out.background = background.map(|v| v * unscale);
-    out.pose = pose_gradient(camera, &total);
+    let shares = Shares { sums, background, scale };
+    from_pixels(simd, gaussians, camera, options, &shares, |i| Decided::of(&splats[i]), out);
     times.project = start.elapsed();
     times
 }
 
+/// What pixels have for Gaussians and the background: dL/d(what they show).
+pub(in crate::render) struct Shares<'a> {
+    /// `[n]`
+    pub(in crate::render) sums: &'a [SplatSums],
+    pub(in crate::render) background: [f64; 3],
+    /// The picture's gradient was brought to this multiple.
+    pub(in crate::render) scale: f64,
+}
+
+/// From pixels to what made them: through the projection and the colour of each Gaussian that drew.
+pub(super) fn from_pixels<S: Lanes>(
+    simd: S,
+    gaussians: &Gaussians,
+    camera: &Camera,
+    options: &RenderOptions,
+    shares: &Shares,
+    decided: impl Fn(usize) -> Decided + Sync,
+    out: &mut Gradients,
+) {
+    let view = PinholeView::new(camera, options, gaussians.sh_degree());
+    let unscale = 1.0 / shares.scale;
+    let total = project_all(simd, &view, gaussians, decided, shares.sums, unscale, out);
+    out.background = shares.background.map(|v| v * unscale);
+    out.pose = pose_gradient(camera, &total);
+}
+
 /// The power of two that brings `largest` to about [`LARGEST`].
-fn scale_of(largest: f32) -> f64 {
+pub(in crate::render) fn scale_of(largest: f32) -> f64 {
     let ratio = if largest > 0.0 { LARGEST / f64::from(largest) } else { 1.0 };
     f64::from_bits(ratio.to_bits() & 0xfff0_0000_0000_0000)
 }
@@ -201,7 +226,7 @@ fn project_all<S: Lanes>(
     simd: S,
     view: &PinholeView,
     gaussians: &Gaussians,
-    splats: &[Splat],
+    decided: impl Fn(usize) -> Decided + Sync,
     sums: &[SplatSums],
     unscale: f64,
     out: &mut Gradients,
@@ -222,7 +247,7 @@ fn project_all<S: Lanes>(
             let chunk = Chunk { first: i * PROJECT_CHUNK, means, rotations, scales, opacities, sh };
             simd.vectorize(
                 #[inline(always)]
-                || project::project(view, gaussians, splats, sums, unscale, chunk),
+                || project::project(view, gaussians, &decided, sums, unscale, chunk),
             )
         })
         .collect();

@@ -17,7 +17,7 @@
 //! * Antialiased, `d log(compensation)/dSigma_0 = e/2 Sigma_0^-1 Sigma^-1`, written as a sum of squares over
 //!   `det_0 det` rather than the difference of two inverses.
 
-use super::super::color;
+use super::super::color::moves;
 use super::super::project::{Inputs, LANES, Placed, dot, placed};
 use super::super::splat::Splat;
 use super::blend::SplatSums;
@@ -43,12 +43,28 @@ pub(super) struct Chunk<'a> {
     pub(super) sh: &'a mut [f32],
 }
 
+/// What the forward pass decided about a splat, which the way back keeps to.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::render) struct Decided {
+    /// Whether its form has x as the pivot: see [`Splat`].
+    pub(in crate::render) pivot_x: bool,
+    /// Whether each channel of its colour moves with its coefficients.
+    pub(in crate::render) color_moves: [bool; 3],
+}
+
+impl Decided {
+    #[inline(always)]
+    pub(super) fn of(splat: &Splat) -> Self {
+        Self { pivot_x: splat.conditional < 0.0, color_moves: moves(splat.color) }
+    }
+}
+
 /// Fills one chunk from the `sums` of its splats, which are `1 / unscale` times too small or too large.
 #[inline(always)]
 pub(super) fn project(
     view: &PinholeView,
     gaussians: &Gaussians,
-    splats: &[Splat],
+    decided: impl Fn(usize) -> Decided,
     sums: &[SplatSums],
     unscale: f64,
     out: Chunk,
@@ -81,33 +97,29 @@ pub(super) fn project(
         }
         let mut lanes = Inputs::default();
         let mut upstream = [[0.0; LANES]; 10];
+        let mut pivot_x = [false; LANES];
         for l in 0..LANES {
             let i = index[l.min(count - 1)];
             lanes.load(l, gaussians, first + i);
+            pivot_x[l] = decided(first + i).pivot_x;
             for k in 0..10 {
                 upstream[k][l] = f64::from(sums[i][k]);
             }
         }
         let mut g = Outputs::default();
         for l in 0..LANES {
-            project_lane(view, &lanes, &upstream, &mut g, l);
+            project_lane(view, &lanes, &upstream, pivot_x[l], &mut g, l);
         }
         for l in 0..count {
             let i = index[l];
             let mut mean = [g.mean[0][l], g.mean[1][l], g.mean[2][l]];
-            let color = [upstream[6][l], upstream[7][l], upstream[8][l]];
             let direction = [g.direction[0][l], g.direction[1][l], g.direction[2][l]];
-            let splat = &splats[first + i];
+            let moves = decided(first + i).color_moves;
+            let color = std::array::from_fn(|c| if moves[c] { upstream[6 + c][l] } else { 0.0 });
             let coefficients_in = &gaussians.sh()[(first + i) * stride..][..3 * coefficients];
             let (coefficients_out, unused) = sh[i * stride..(i + 1) * stride].split_at_mut(3 * coefficients);
             unused.fill(0.0);
-            let turn = color_backward(
-                coefficients_in,
-                direction,
-                color::gate(splat.color, color),
-                unscale,
-                coefficients_out,
-            );
+            let turn = color_backward(coefficients_in, direction, color, unscale, coefficients_out);
             // d(unit d)/dd = (I - d d^T) / |d|.
             let along = dot(turn, direction);
             for k in 0..3 {
@@ -149,7 +161,14 @@ struct Outputs {
 
 /// One lane, without branches or closures, so that the compiler turns the loop over lanes into vectors.
 #[inline(always)]
-fn project_lane(view: &PinholeView, g: &Inputs, upstream: &[[f64; LANES]; 10], out: &mut Outputs, l: usize) {
+fn project_lane(
+    view: &PinholeView,
+    g: &Inputs,
+    upstream: &[[f64; LANES]; 10],
+    pivot_x: bool,
+    out: &mut Outputs,
+    l: usize,
+) {
     let placed = placed(view, g, l);
     let Placed {
         d, inverse_z, point: [x, y], clamped: [xc, yc], magnification: [sx, sy], two, columns, ..
@@ -173,7 +192,6 @@ fn project_lane(view: &PinholeView, g: &Inputs, upstream: &[[f64; LANES]; 10], o
     let e = view.blur;
     let determinant = e * e + e * (aa + bb) + determinant_before;
     let (variance_x, variance_y) = (aa + e, bb + e);
-    let pivot_x = variance_x > variance_y;
 
     // L^-1: t = (o - slope p) / deviation_t, s = p / deviation_s for an offset (o, p), p along the pivot.
     let c = if pivot_x { variance_x } else { variance_y };

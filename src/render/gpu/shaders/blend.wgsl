@@ -20,22 +20,6 @@ var<workgroup> batch_tints: array<vec4<f32>, PIXELS>;
 var<workgroup> live: atomic<u32>;
 var<workgroup> is_live: u32;
 
-// 2^x for x <= 0: 2^round(x) times a polynomial in the rest, at most 2 units of the last place from it. The
-// built-in's error grows with x.
-fn exp2_of(x: f32) -> f32 {
-    let y = max(x, -100.0);
-    let n = round(y);
-    let f = y - n;
-    var p = 1.5453163e-4;
-    p = p * f + 1.3390863e-3;
-    p = p * f + 9.618083e-3;
-    p = p * f + 5.550357e-2;
-    p = p * f + 0.2402265;
-    p = p * f + 0.6931472;
-    p = p * f + 1.0;
-    return p * bitcast<f32>(u32(i32(n) + 127) << 23u);
-}
-
 @compute @workgroup_size(PIXELS)
 fn blend(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let x = group.x * TILE + lane % TILE;
@@ -81,13 +65,7 @@ fn blend(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
         workgroupBarrier();
         for (var k = 0u; k < count && t > 0.0; k++) {
             let s = batch[k];
-            let dx = (center.x - center_x(s)) - s.rest_x;
-            let dy = (center.y - center_y(s)) - s.rest_y;
-            let is_pivot_x = s.conditional < 0.0;
-            let along = select(dy, dx, is_pivot_x);
-            let across = select(dx, dy, is_pivot_x) - s.slope * along;
-            let q = abs(s.conditional) * (across * across) + s.marginal * (along * along);
-            let alpha = min(s.opacity * exp2_of(-q), frame.max_alpha);
+            let alpha = alpha_of(s, offset_of(s, center));
             if (alpha >= ALPHA_THRESHOLD) {
                 let next = t * (1.0 - alpha);
                 if (next > TRANSMITTANCE_THRESHOLD) {

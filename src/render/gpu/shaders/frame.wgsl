@@ -29,7 +29,7 @@ struct Frame {
     expected_depth: u32,
     // Always 0, which compilers cannot know: see `opaque`.
     nothing: u32,
-    // The band of the picture at hand, in tiles.
+    // The band of the picture at hand, or the window of it, in tiles.
     tile_columns: u32,
     first_tile_row: u32,
     tile_rows: u32,
@@ -41,6 +41,12 @@ struct Frame {
     is_last: u32,
     // Bits of the smallest depth that can occur.
     first_key: u32,
+    // Of the window of the band, where it does not have all of its columns.
+    first_tile_column: u32,
+    // Going back: the row of pixels at which the band begins, and which pairs' gradients are held.
+    band_row: u32,
+    first_pair: u32,
+    held_pairs: u32,
 }
 
 // 32 bytes. The exponent of a splat is, in base 2 with (dx, dy) from its centre to a pixel's centre,
@@ -65,6 +71,8 @@ const TILE: u32 = 8u;
 const NOT_DRAWN: u32 = 0xffffffffu;
 const ALPHA_THRESHOLD: f32 = 1.0 / 255.0;
 const TRANSMITTANCE_THRESHOLD: f32 = 1e-4;
+// Colours are cut here, so that sums stay in f32.
+const MAX_COLOR: f32 = 1e30;
 const MIN_COMPENSATION: f32 = 0.005;
 const HALF_LOG2_E: f32 = 0.72134752;
 // Lengths in pixels are cut here, so that their squares stay in f32.

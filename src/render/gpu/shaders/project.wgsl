@@ -22,7 +22,6 @@ struct Chunk {
 @group(0) @binding(6) var<storage, read_write> keys: array<u32>;
 
 const MAX_COORDINATE: f32 = 1e20;
-const MAX_COLOR: f32 = 1e30;
 
 // Compilers simplify (a + b) - a, which is not b in floating point. They cannot see through this.
 fn opaque(x: f32) -> f32 {

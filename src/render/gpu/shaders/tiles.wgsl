@@ -70,7 +70,7 @@ fn rows(e: Ellipse) -> vec2<i32> {
     return vec2(max(rows.x, first), min(rows.y, first + i32(frame.tile_rows) - 1));
 }
 
-// Columns of tiles in one row of them.
+// Columns of tiles in one row of them, of those in the window.
 fn columns(e: Ellipse, row: i32) -> vec2<i32> {
     let top = f32(row * i32(TILE)) + 0.5 - e.center.y;
     let low = clamp(top, -e.reach_y, e.reach_y);
@@ -81,7 +81,9 @@ fn columns(e: Ellipse, row: i32) -> vec2<i32> {
     let half_left = sqrt(max(e.q_max - e.row * left * left, 0.0) * e.inverse_column);
     let from_x = e.center.x + e.slope * left - half_left;
     let to_x = e.center.x + e.slope * right + half_right;
-    return tiles_between(from_x, to_x, frame.width);
+    let columns = tiles_between(from_x, to_x, frame.width);
+    let first = i32(frame.first_tile_column);
+    return vec2(max(columns.x, first), min(columns.y, first + i32(frame.tile_columns) - 1));
 }
 
 @compute @workgroup_size(256)
@@ -97,7 +99,7 @@ fn cover(@builtin(global_invocation_id) id: vec3<u32>) {
         let r = rows(e);
         for (var row = r.x; row <= r.y; row++) {
             let c = columns(e, row);
-            pairs += u32(c.y - c.x + 1);
+            pairs += u32(max(c.y - c.x + 1, 0));
         }
     }
     offsets[rank] = pairs;
@@ -121,7 +123,7 @@ fn emit(@builtin(global_invocation_id) id: vec3<u32>) {
         let r = rows(e);
         for (var row = r.x; row <= r.y; row++) {
             let c = columns(e, row);
-            let first = (row - i32(frame.first_tile_row)) * i32(frame.tile_columns);
+            let first = (row - i32(frame.first_tile_row)) * i32(frame.tile_columns) - i32(frame.first_tile_column);
             for (var column = c.x; column <= c.y && at < end; column++) {
                 pair_tiles[at] = u32(first + column);
                 pair_splats[at] = splat;

@@ -1,0 +1,214 @@
+//! A picture: bands of bounded size, a band in slices of bounded pairs. One of each is the rule, and then the processor
+//! waits once.
+
+use super::asset::GpuAsset;
+use super::frame::{Frame, TILE};
+use super::memory::{Memory, PIXEL};
+use super::stages::{Stages, bits_of};
+use super::{GpuRenderer, MOST_TILES};
+use crate::error::Result;
+use crate::geometry::Camera;
+use crate::render::{RenderOptions, Rendered};
+
+impl GpuRenderer {
+    /// Of a valid camera without a lens.
+    pub(super) fn draw(
+        &self,
+        asset: &GpuAsset,
+        camera: &Camera,
+        options: &RenderOptions,
+        target: &mut Rendered,
+    ) -> Result<()> {
+        let mut held = self.lock();
+        // What an error left is not to be trusted: it is taken, and put back when all went well.
+        let mut memory = held.take().unwrap_or_else(|| Memory::new(&self.device));
+        self.draw_bands(asset, camera, options, &mut memory, target)?;
+        *held = Some(memory);
+        Ok(())
+    }
+
+    fn draw_bands(
+        &self,
+        asset: &GpuAsset,
+        camera: &Camera,
+        options: &RenderOptions,
+        memory: &mut Memory,
+        target: &mut Rendered,
+    ) -> Result<()> {
+        let (mut frame, depth_bits) = self.frame(asset, camera, options, memory);
+        let whole = Rows { first: 0, count: frame.tile_rows };
+        let most = self.rows_of_a_band(camera);
+        resize(target, camera);
+
+        memory.for_band(&self.device, tiles(camera, most), pixels(camera, Rows { count: most, ..whole }));
+        for first in (0..whole.count).step_by(most as usize) {
+            let rows = Rows { first, count: most.min(whole.count - first) };
+            (frame.first_tile_row, frame.tile_rows) = (rows.first, rows.count);
+            self.draw_band(asset, camera, &mut frame, depth_bits, memory, target)?;
+        }
+        Ok(())
+    }
+
+    /// What kernels are to know of the picture, with room for its Gaussians, and how many bits their depths differ in.
+    pub(super) fn frame(
+        &self,
+        asset: &GpuAsset,
+        camera: &Camera,
+        options: &RenderOptions,
+        memory: &mut Memory,
+    ) -> (Frame, u32) {
+        let depths = asset.depths(camera, [options.near, options.far]);
+        let depth_bits = bits_of((depths[1].to_bits() - depths[0].to_bits()).saturating_add(1));
+        let frame = Frame::new(asset, camera, options, depths);
+        memory.for_gaussians(&self.device, asset.count as u64);
+        self.device.queue.write_buffer(&memory.counters.gaussians, 0, bytemuck::bytes_of(&frame.count));
+        (frame, depth_bits)
+    }
+
+    /// One band: in one slice if its pairs fit, else slice after slice until every pixel is finished.
+    fn draw_band(
+        &self,
+        asset: &GpuAsset,
+        camera: &Camera,
+        frame: &mut Frame,
+        depth_bits: u32,
+        memory: &mut Memory,
+        target: &mut Rendered,
+    ) -> Result<()> {
+        let rows = Rows { first: frame.first_tile_row, count: frame.tile_rows };
+        // A splat has at most one pair per tile: a slice holds one at least.
+        let most_pairs = self.bounds.pairs.max(tiles(camera, rows.count));
+        let mut wanted = first_guess(asset, most_pairs);
+        (frame.slice_start, frame.is_first, frame.is_last) = (0, 1, 1);
+        loop {
+            memory.for_pairs(&self.device, wanted);
+            let slice = self.draw_slice(asset, camera, frame, depth_bits, memory, target)?;
+            let all_fit = slice.pairs <= frame.pair_capacity;
+            if frame.is_last == 1 && all_fit {
+                return Ok(());
+            }
+            if frame.is_last == 1 {
+                // Nothing is drawn yet that counts: once more with room for all, or in slices.
+                let needed = u64::from(slice.pairs).next_power_of_two();
+                frame.is_last = u32::from(needed <= most_pairs);
+                wanted = needed.min(most_pairs);
+                continue;
+            }
+            frame.is_first = 0;
+            frame.slice_start = slice.end;
+            if all_fit || !slice.is_unfinished {
+                // An empty slice completes the picture.
+                (frame.slice_start, frame.is_last) = (u32::MAX, 1);
+            }
+        }
+    }
+
+    /// The stages, in their order.
+    fn draw_slice(
+        &self,
+        asset: &GpuAsset,
+        camera: &Camera,
+        frame: &mut Frame,
+        depth_bits: u32,
+        memory: &mut Memory,
+        target: &mut Rendered,
+    ) -> Result<Slice> {
+        let Memory { counters, gaussian: Some(per), pair: Some(pair), band: Some(band), .. } = &*memory
+        else {
+            unreachable!("made before any slice");
+        };
+        frame.pair_capacity = pair.tiles.capacity as u32;
+        let queue = &self.device.queue;
+        queue.write_buffer(&counters.frame, 0, bytemuck::bytes_of(frame));
+        queue.write_buffer(&counters.slice_end, 0, bytemuck::bytes_of(&u32::MAX));
+        queue.write_buffer(&counters.unfinished, 0, bytemuck::bytes_of(&0u32));
+
+        let rows = Rows { first: frame.first_tile_row, count: frame.tile_rows };
+        let tile_bits = bits_of(tiles(camera, rows.count) as u32);
+        let pixels = pixels(camera, rows);
+        let mut stages = Stages::new(&self.device, &self.kernels);
+        let splats_of = (asset.id, frame.of_splats());
+        if memory.splats_of != Some(splats_of) {
+            stages.project(asset, counters, per);
+            stages.sort_by_depth(counters, per, depth_bits);
+        }
+        stages.list_pairs(counters, per, pair, depth_bits);
+        stages.sort_by_tile(per, pair, band, tile_bits);
+        stages.blend(frame, counters, per, pair, band, tile_bits);
+        stages.read_back(counters, per, band, (frame.is_last == 1).then_some(pixels));
+        stages.submit();
+
+        let mut numbers = [0u32; 3];
+        let first = (rows.first * TILE) as usize * camera.width as usize;
+        let take = |i: usize, bytes: &[u8]| match i {
+            0 => bytemuck::bytes_of_mut(&mut numbers).copy_from_slice(bytes),
+            _ => write_band(target, first, bytes),
+        };
+        let buffers = [(&counters.readback, 12), (&band.readback, PIXEL * pixels)];
+        self.device.read(&buffers[..if frame.is_last == 1 { 2 } else { 1 }], take)?;
+        let [pairs, end, unfinished] = numbers;
+        memory.splats_of = Some(splats_of);
+        let is_whole = frame.slice_start == 0 && pairs <= frame.pair_capacity;
+        memory.pairs_of = is_whole.then_some(((asset.id, frame.of_lists()), pairs));
+        Ok(Slice { pairs, end, is_unfinished: unfinished != 0 })
+    }
+
+    /// Rows of tiles that a band may have.
+    pub(super) fn rows_of_a_band(&self, camera: &Camera) -> u32 {
+        let columns = u64::from(camera.width.div_ceil(TILE));
+        let row_of_pixels = u64::from(camera.width) * u64::from(TILE);
+        let pixels = self.bounds.pixels.min(self.bounds.binding / PIXEL);
+        let most = (MOST_TILES / columns).min(pixels / row_of_pixels).max(1);
+        most.min(u64::from(camera.height.div_ceil(TILE))) as u32
+    }
+}
+
+/// Rows of tiles.
+#[derive(Clone, Copy)]
+pub(super) struct Rows {
+    pub(super) first: u32,
+    pub(super) count: u32,
+}
+
+/// How a slice went.
+struct Slice {
+    /// Those of all splats from its start on, whether they fitted or not.
+    pairs: u32,
+    /// Rank of the first splat that did not fit.
+    end: u32,
+    is_unfinished: bool,
+}
+
+/// Room for pairs to begin with: one for each Gaussian, within bounds.
+pub(super) fn first_guess(asset: &GpuAsset, most: u64) -> u64 {
+    (asset.count as u64).next_power_of_two().clamp(MOST_TILES.min(most), most)
+}
+
+pub(super) fn tiles(camera: &Camera, rows: u32) -> u64 {
+    u64::from(camera.width.div_ceil(TILE)) * u64::from(rows)
+}
+
+/// Pixels in rows of tiles, of which the picture's last may be cut.
+pub(super) fn pixels(camera: &Camera, rows: Rows) -> u64 {
+    let last = ((rows.first + rows.count) * TILE).min(camera.height);
+    u64::from(camera.width) * u64::from(last - rows.first * TILE)
+}
+
+fn resize(target: &mut Rendered, camera: &Camera) {
+    let pixels = camera.width as usize * camera.height as usize;
+    (target.width, target.height) = (camera.width, camera.height);
+    target.color.resize(pixels, [0.0; 3]);
+    target.alpha.resize(pixels, 0.0);
+    target.depth.resize(pixels, 0.0);
+}
+
+/// The planes of a band, one after the other in `bytes`, from pixel `first` on.
+fn write_band(target: &mut Rendered, first: usize, bytes: &[u8]) {
+    let pixels = bytes.len() / PIXEL as usize;
+    let (color, rest) = bytes.split_at(12 * pixels);
+    let (alpha, depth) = rest.split_at(4 * pixels);
+    let band = first..first + pixels;
+    bytemuck::cast_slice_mut(&mut target.color[band.clone()]).copy_from_slice(color);
+    bytemuck::cast_slice_mut(&mut target.alpha[band.clone()]).copy_from_slice(alpha);
+    bytemuck::cast_slice_mut(&mut target.depth[band]).copy_from_slice(depth);
+}
