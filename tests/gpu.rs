@@ -3,15 +3,17 @@
 mod common;
 
 use common::gpu::renderer;
+use common::gradients::noise;
 use common::scenes::{looking_at_origin, random, surfel_car};
 use common::{compare, is_finite};
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
 use vg::geometry::Distortion;
 use vg::geometry::camera::Intrinsics;
+use vg::render::gpu::Bounds;
 use vg::render::{
-    Adapter, AssetRenderer, Backend, Background, CpuRenderer, DepthMode, GpuRenderer, Reference,
-    RenderOptions, Rendered, Renderer,
+    Adapter, AssetRenderer, Backend, Background, CpuRenderer, DepthMode, Differentiable, GpuRenderer,
+    Gradients, Reference, RenderOptions, Rendered, Renderer,
 };
 use vg::{Camera, Gaussians, Pose};
 
@@ -167,6 +169,65 @@ fn bands_slices_chunks_and_repetition_change_no_byte() {
 }
 
 #[test]
+fn gradients_are_the_same_bytes_in_bands_windows_and_repeated_walks() {
+    let Some(gpu) = renderer() else { return };
+    let mut gaussians = random(10, 2000, 2, [0.005, 0.2]);
+    gaussians.append(&random(11, 60, 2, [1.0, 3.0]));
+    let camera = looking_at_origin(200, 150, DVec3::new(0.4, -1.0, 0.3), 5.0);
+    let gradient = noise(3, &camera);
+    let expected = gpu.backward(&gaussians, &camera, &options(), &gradient).unwrap();
+    assert!(expected.means.iter().filter(|m| **m != [0.0; 3]).count() > 300);
+    assert!(gpu.backward(&gaussians, &camera, &options(), &gradient).unwrap() == expected, "a second time");
+
+    // With its picture, and what the picture left is used; the loss may draw meanwhile.
+    let asset = gpu.upload(&random(4, 300, 0, [0.1, 0.2])).unwrap();
+    for meanwhile in [false, true] {
+        let (mut picture, mut of_picture, mut found) = Default::default();
+        let targets = (&mut picture, &mut of_picture, &mut found);
+        gpu.render_with_gradients_into(&gaussians, &camera, &options(), targets, |picture, g| {
+            assert!((picture.width, picture.height) == (200, 150));
+            g.clone_from(&gradient);
+            if meanwhile {
+                gpu.render_asset(&asset, &camera, &options())?;
+            }
+            Ok(())
+        })
+        .unwrap();
+        assert!(found == expected, "with the picture, {meanwhile}");
+        assert!(picture == gpu.render(&gaussians, &camera, &options()).unwrap());
+    }
+
+    let bounded = |change: fn(&mut Bounds)| renderer().unwrap().bounded(change);
+    let same = [
+        ("bands", bounded(|b| b.pixels = 200 * 40)),
+        ("windows of rows", bounded(|b| b.pairs = 1 << 14)),
+        ("repeated walks", bounded(|b| b.shares = 1000)),
+        ("chunks", bounded(|b| b.binding = 70_000)),
+    ];
+    for (name, gpu) in same {
+        let found = gpu.backward(&gaussians, &camera, &options(), &gradient).unwrap();
+        // Tiles' shares of the background are rounded once, and added up in f64.
+        for c in 0..3 {
+            assert!((found.background[c] - expected.background[c]).abs() < 1e-12, "{name}");
+        }
+        let found = Gradients { background: expected.background, ..found };
+        assert!(found == expected, "{name}");
+    }
+    // Windows of columns come in another order than rows: sums differ in rounding.
+    let found = bounded(|b| b.pairs = 1).backward(&gaussians, &camera, &options(), &gradient).unwrap();
+    let largest = |v: &[f32]| v.iter().fold(0.0f32, |m, v| m.max(v.abs()));
+    for (a, b) in [
+        (found.means.as_flattened(), expected.means.as_flattened()),
+        (found.scales.as_flattened(), expected.scales.as_flattened()),
+        (&found.opacities, &expected.opacities),
+        (&found.sh, &expected.sh),
+    ] {
+        let difference: Vec<f32> = a.iter().zip(b).map(|(a, b)| a - b).collect();
+        assert!(largest(&difference) <= 1e-5 * largest(b), "{:e}", largest(&difference));
+    }
+}
+
+#[test]
 fn any_finite_input_gives_a_finite_picture() {
     let Some(gpu) = renderer() else { return };
     let values = [1.2e-38f32, 1e-20, 1e-8, 1e-3, 1.0, 1e4, 1e9];
@@ -269,6 +330,7 @@ fn a_lost_device_and_what_does_not_fit_are_errors_that_say_so() {
         gpu.render_asset(&asset, &camera, &options()).unwrap_err(),
         gpu.render(&g, &camera, &options()).unwrap_err(),
         gpu.upload(&g).unwrap_err(),
+        gpu.backward(&g, &camera, &options(), &noise(1, &camera)).unwrap_err(),
     ] {
         let text = error.to_string();
         assert!(text.starts_with("graphics processor: ") && text.contains("was lost"), "{text}");
