@@ -1010,6 +1010,15 @@ typedef struct vg_options {
      * 1: one of three or more views takes no part in the optimisation and tells when to stop; 0: all do. Default 0.
      */
     int32_t refine_hold_out;
+    /**
+     * A `vg_backend`: who draws and goes back in the optimisation. Default `VG_BACKEND_AUTO`: what is known to pay, at
+     * present the CPU. `VG_BACKEND_GPU` answers the same input on the same device with the same bytes.
+     */
+    int32_t refine_backend;
+    /**
+     * Must be 0.
+     */
+    uint32_t refine_flags;
 } vg_options;
 
 /**

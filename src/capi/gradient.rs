@@ -6,11 +6,11 @@ use super::gaussians::{self, vg_gaussians};
 use super::guard::guarded;
 use super::image::extent;
 use super::read::{self, Versioned};
-use super::render::{Target, vg_alpha, vg_backend, vg_image_target, vg_render_options};
+use super::render::{Target, device, vg_alpha, vg_image_target, vg_render_options};
 use super::status::{vg_error, vg_status};
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
-use crate::render::{Background, Differentiable, Gradients, PictureGradient};
+use crate::render::{Background, Gradients, PictureGradient, Rendered};
 use std::ffi::c_void;
 
 /// Called once on the calling thread when the picture is in `target`; fills the planes that the `vg_image_gradient`
@@ -182,13 +182,7 @@ pub unsafe extern "C" fn vg_render_backward(
             let camera = camera::camera("camera", &read::required("camera", camera)?)?;
             let options = read::optional("options", options)?;
             let (settings, alpha) = options.read()?;
-            if options.backend == vg_backend::Gpu as i32 {
-                return Err(Error::NotBuilt {
-                    argument: "options.backend".into(),
-                    found: "the gradient of a gpu's picture".into(),
-                    remedy: "go back with auto or cpu".into(),
-                });
-            }
+            let device = device(&options)?;
             let target = match target.is_null() {
                 true => None,
                 false => {
@@ -213,8 +207,9 @@ pub unsafe extern "C" fn vg_render_backward(
                 planes.copy(&mut of_picture)?;
             }
             in_context(options.context, |shop| {
+                let renderer = device.as_deref().unwrap_or(&shop.renderer);
                 let Some(target) = target else {
-                    let back = || shop.renderer.backward(gaussians, &camera, &settings, &of_picture);
+                    let back = || renderer.backward(gaussians, &camera, &settings, &of_picture);
                     out.write(&shop.threads.run(back)?);
                     return Ok(());
                 };
@@ -224,7 +219,7 @@ pub unsafe extern "C" fn vg_render_backward(
                     let draw = |ask: &dyn Fn(()) -> i32| {
                         let Lent(target, planes) = lent.get();
                         let targets = (&mut *picture, &mut of_picture, &mut gradients);
-                        let loss = |picture: &_, of_picture: &mut PictureGradient| {
+                        let mut loss = |picture: &Rendered, of_picture: &mut PictureGradient| {
                             if planes.loss.is_some() {
                                 target.write(picture);
                                 if ask(()) != 0 {
@@ -234,7 +229,7 @@ pub unsafe extern "C" fn vg_render_backward(
                             // What was copied before is no longer there: the renderer empties it.
                             planes.copy(of_picture)
                         };
-                        shop.renderer.render_with_gradients_into(gaussians, &camera, &settings, targets, loss)
+                        renderer.both_ways(gaussians, &camera, &settings, targets, &mut loss)
                     };
                     let on_this_thread = |()| planes.loss.map_or(0, |loss| loss(planes.loss_user));
                     shop.threads.run_asking(draw, on_this_thread)?;

@@ -4,6 +4,7 @@ use super::context::vg_context;
 use super::guard::guarded;
 use super::model::{self, vg_model};
 use super::read::{self, Versioned};
+use super::render::{backend, vg_backend};
 use super::status::{c_string, one_line, vg_status};
 use crate::error::{Error, Result};
 use crate::pipeline::{Calibrate, Keep, Options, PriorChoice};
@@ -169,6 +170,11 @@ pub struct vg_options {
     pub refine_iterations: u32,
     /// 1: one of three or more views takes no part in the optimisation and tells when to stop; 0: all do. Default 0.
     pub refine_hold_out: i32,
+    /// A `vg_backend`: who draws and goes back in the optimisation. Default `VG_BACKEND_AUTO`: what is known to pay, at
+    /// present the CPU. `VG_BACKEND_GPU` answers the same input on the same device with the same bytes.
+    pub refine_backend: i32,
+    /// Must be 0.
+    pub refine_flags: u32,
 }
 
 unsafe impl Versioned for vg_options {
@@ -204,6 +210,8 @@ unsafe impl Versioned for vg_options {
             refine_seconds: 0.0,
             refine_iterations: 0,
             refine_hold_out: 0,
+            refine_backend: vg_backend::Auto as i32,
+            refine_flags: 0,
         }
     }
 }
@@ -258,6 +266,8 @@ impl vg_options {
 
     fn refinement(&self) -> Result<Option<RefineOptions>> {
         let hold_out = read::flag("options.refine_hold_out", self.refine_hold_out)?;
+        let backend = backend("options.refine_backend", self.refine_backend)?;
+        read::zero("options.refine_flags", self.refine_flags == 0)?;
         let amount = match (self.refine_iterations, self.refine_seconds) {
             (0, 0.0) => return Ok(None),
             (steps, 0.0) => Amount::Iterations(steps),
@@ -267,7 +277,7 @@ impl vg_options {
                 return Err(Error::argument("options.refine_seconds", found, "one of both"));
             }
         };
-        let options = RefineOptions { amount, hold_out, ..RefineOptions::default() };
+        let options = RefineOptions { amount, hold_out, backend, ..RefineOptions::default() };
         let names = [
             ("options.refine.iterations", "options.refine_iterations"),
             ("options.refine.seconds", "options.refine_seconds"),

@@ -9,9 +9,7 @@ use super::options::sh_degree;
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
 use crate::error::{Error, Result};
-use crate::gaussians::Gaussians;
-use crate::geometry::Camera;
-use crate::render::backend::is_built;
+use crate::render::backend::{Trainer, is_built, not_built, trainer};
 use crate::render::{Backend, Background, DepthMode, RenderOptions, Rendered};
 use std::ffi::c_void;
 
@@ -210,9 +208,9 @@ pub unsafe extern "C" fn vg_render(
             let target = Target::read("target", &target, &settings, alpha, camera.width, camera.height)?;
             in_context(options.context, |shop| {
                 shop.with_picture(|picture| {
-                    match options.backend == vg_backend::Gpu as i32 {
-                        true => gpu_picture(gaussians, &camera, &settings, picture)?,
-                        false => shop.threads.run(|| {
+                    match device(&options)? {
+                        Some(device) => *picture = device.render(gaussians, &camera, &settings)?,
+                        None => shop.threads.run(|| {
                             shop.renderer.render_into(gaussians, &camera, &settings, picture).map(drop)
                         })?,
                     }
@@ -224,6 +222,14 @@ pub unsafe extern "C" fn vg_render(
     }
 }
 
+/// The graphics processor, where a picture is to be drawn there.
+pub(super) fn device(options: &vg_render_options) -> Result<Option<Trainer>> {
+    match options.backend == vg_backend::Gpu as i32 {
+        true => Ok(Some(trainer(Backend::Gpu)?.0)),
+        false => Ok(None),
+    }
+}
+
 /// Who is asked to draw, if this build can.
 pub(super) fn backend(argument: &str, number: i32) -> Result<Backend> {
     let backends = [
@@ -232,36 +238,9 @@ pub(super) fn backend(argument: &str, number: i32) -> Result<Backend> {
         (vg_backend::Gpu as i32, "gpu", Backend::Gpu),
     ];
     match read::choice(argument, number, &backends)? {
-        Backend::Gpu if !is_built() => Err(Error::NotBuilt {
-            argument: argument.into(),
-            found: "gpu".into(),
-            remedy: "build with the feature gpu, or draw with auto or cpu".into(),
-        }),
+        Backend::Gpu if !is_built() => Err(not_built(argument)),
         backend => Ok(backend),
     }
-}
-
-/// One picture by a graphics processor, to which the Gaussians are copied for it.
-#[cfg(feature = "gpu")]
-fn gpu_picture(
-    gaussians: &Gaussians,
-    camera: &Camera,
-    settings: &RenderOptions,
-    picture: &mut Rendered,
-) -> Result<()> {
-    use crate::render::{Adapter, GpuRenderer, Renderer};
-    *picture = GpuRenderer::shared(Adapter::Any)?.render(gaussians, camera, settings)?;
-    Ok(())
-}
-
-/// `backend` has refused before.
-#[cfg(not(feature = "gpu"))]
-fn gpu_picture(_: &Gaussians, _: &Camera, _: &RenderOptions, _: &mut Rendered) -> Result<()> {
-    Err(Error::NotBuilt {
-        argument: "options.backend".into(),
-        found: "gpu".into(),
-        remedy: "draw with auto or cpu".into(),
-    })
 }
 
 impl vg_render_options {

@@ -72,6 +72,8 @@ pub struct Refinement {
     pub exposures: Vec<[f32; 3]>,
     /// What density control did, where it was wanted.
     pub densified: Option<Densified>,
+    /// Who drew, and why.
+    pub drawn_by: String,
 }
 
 /// The view that took no part.
@@ -107,7 +109,7 @@ pub(crate) fn refine(
     gaussians.truncate(gaussians.len() - clones.len());
     let beginning = State::of(&gaussians, clones, views.len());
     let measures = Measures { noise: NOISE, extent_m: half_diagonal_m(&gaussians), seed: 0 };
-    let mut work = Work::new(&beginning, views, options, measures);
+    let mut work = Work::new(&beginning, views, options, measures)?;
     let mut state = beginning.clone();
     drop(gaussians);
     let held_out = (options.hold_out && views.len() >= 3).then_some(views.len() / 2);
@@ -176,6 +178,7 @@ pub(crate) fn refine(
         held_out: held_out.map(|v| HeldOut { view: views[v].name.clone(), psnr_db: [before[v], after[v]] }),
         exposures: (0..views.len()).map(|v| best.state.exposure.factor(v)).collect(),
         densified: work.densified(),
+        drawn_by: work.drawn_by(),
     };
     Ok((work.finished(&best.state, context), report))
 }

@@ -3,6 +3,8 @@
 use super::densify::Densify;
 use super::parameters::Rates;
 use crate::error::{Error, Result};
+use crate::render::Backend;
+use crate::render::backend::{is_built, not_built};
 use serde::Serialize;
 
 /// How long to refine.
@@ -36,6 +38,8 @@ pub struct RefineOptions {
     pub hold_out: bool,
     /// Whether Gaussians divide and go on the way; `None`, the default: they do not.
     pub densify: Option<Densify>,
+    /// Who draws and goes back; [`trainer`](crate::render::backend::trainer) says what `Auto` is.
+    pub backend: Backend,
 }
 
 impl Default for RefineOptions {
@@ -57,6 +61,7 @@ impl Default for RefineOptions {
             exposure: true,
             hold_out: false,
             densify: None,
+            backend: Backend::Auto,
         }
     }
 }
@@ -72,6 +77,9 @@ impl RefineOptions {
         let refuse = |field: &str, found: String, allowed: &str| {
             Err(Error::argument(format!("{argument}.{field}"), found, allowed))
         };
+        if self.backend == Backend::Gpu && !is_built() {
+            return Err(not_built(&format!("{argument}.backend")));
+        }
         match self.amount {
             Amount::Iterations(n) if n > MOST_ITERATIONS => {
                 return refuse("iterations", n.to_string(), "at most 1000000");

@@ -7,7 +7,8 @@ use super::{RefineOptions, State, tie};
 use crate::error::Result;
 use crate::gaussians::Gaussians;
 use crate::progress::Context;
-use crate::render::{Background, CpuRenderer, Gradients, PictureGradient, RenderOptions, Rendered};
+use crate::render::backend::{Choice, Trainer, trainer};
+use crate::render::{Background, Gradients, PictureGradient, RenderOptions, Rendered};
 use crate::scene::View;
 
 /// What is not the same for every way to optimise.
@@ -28,7 +29,8 @@ pub(super) struct Work<'a> {
     options: &'a RefineOptions,
     measures: Measures,
     optimizer: Optimizer,
-    renderer: CpuRenderer,
+    renderer: Trainer,
+    choice: Choice,
     render: RenderOptions,
     /// What density control did.
     densified: Densified,
@@ -50,17 +52,19 @@ impl<'a> Work<'a> {
         views: &'a [View],
         options: &'a RefineOptions,
         measures: Measures,
-    ) -> Self {
+    ) -> Result<Self> {
         let Parameters { sh_degree, .. } = state.parameters;
         let mut seen = Seen::default();
         seen.reset(state.parameters.len());
-        Self {
+        let (renderer, choice) = trainer(options.backend)?;
+        Ok(Self {
             views,
             targets: views.iter().map(Target::of).collect(),
             options,
             measures,
             optimizer: Optimizer::new(state.parameters.len(), sh_degree, measures.noise),
-            renderer: CpuRenderer::new(),
+            renderer,
+            choice,
             // Drawn on nothing, so that exposure acts on the vehicle alone.
             render: RenderOptions { background: Background::Transparent, ..RenderOptions::default() },
             densified: Densified::default(),
@@ -71,7 +75,12 @@ impl<'a> Work<'a> {
             gradients: Gradients::default(),
             seen,
             watches: options.densify.is_some(),
-        }
+        })
+    }
+
+    /// Who draws, and why.
+    pub(super) fn drawn_by(&self) -> String {
+        self.choice.to_string()
     }
 
     /// From now on colours have this SH degree; those above do nothing and stay as they are.
@@ -94,13 +103,13 @@ impl<'a> Work<'a> {
         context.parallel(|| {
             tie::made(parameters, clones, gaussians);
             let mut loss = Loss::default();
-            let of_loss = |picture: &Rendered, of_picture: &mut PictureGradient| {
+            let mut of_loss = |picture: &Rendered, of_picture: &mut PictureGradient| {
                 loss = targets[view].loss(picture, exposure.factor(view), options, shown, of_picture)?;
                 Ok(())
             };
             let camera = &views[view].camera;
             let results = (picture, of_picture, &mut *gradients);
-            renderer.render_with_gradients_into(gaussians, camera, render, results, of_loss)?;
+            renderer.both_ways(gaussians, camera, render, results, &mut of_loss)?;
             if *watches {
                 seen.note(gaussians, gradients, camera, clones);
             }
@@ -184,7 +193,7 @@ impl<'a> Work<'a> {
 
     fn draw(&mut self, view: usize) -> Result<()> {
         let camera = &self.views[view].camera;
-        self.renderer.render_into(&self.gaussians, camera, &self.render, &mut self.picture)?;
+        self.picture = self.renderer.render(&self.gaussians, camera, &self.render)?;
         Ok(())
     }
 

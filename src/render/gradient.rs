@@ -108,6 +108,26 @@ pub trait Differentiable: Renderer {
         options: &RenderOptions,
         gradient: &PictureGradient,
     ) -> Result<Gradients>;
+
+    /// A picture and the gradients of a loss of it, into memory that is reused; what both need is done once where the
+    /// renderer can. `loss` adds to the gradient of the picture, which has its size and no plane yet; its error ends the
+    /// call. It is called once, or more often by a renderer that begins anew.
+    ///
+    /// After an error the targets hold nothing in particular.
+    fn both_ways(
+        &self,
+        gaussians: &Gaussians,
+        camera: &Camera,
+        options: &RenderOptions,
+        (picture, of_picture, gradients): (&mut Rendered, &mut PictureGradient, &mut Gradients),
+        loss: &mut dyn FnMut(&Rendered, &mut PictureGradient) -> Result<()>,
+    ) -> Result<()> {
+        *picture = self.render(gaussians, camera, options)?;
+        of_picture.reset(picture);
+        loss(picture, of_picture)?;
+        *gradients = self.backward(gaussians, camera, options, of_picture)?;
+        Ok(())
+    }
 }
 
 impl PictureGradient {

@@ -1,5 +1,6 @@
 //! Alpha-blended splatting (method section 5): options, targets, and the renderers behind one trait.
 
+mod asset;
 pub mod backend;
 pub mod cpu;
 pub mod distorted;
@@ -12,7 +13,8 @@ pub mod output;
 pub mod reference;
 mod view;
 
-pub use backend::{AssetRenderer, Backend, Choice};
+pub use asset::{AssetRenderer, WORTH_A_DEVICE};
+pub use backend::{Backend, Choice};
 pub use cpu::CpuRenderer;
 #[cfg(feature = "gpu")]
 pub use gpu::{Adapter, GpuAsset, GpuRenderer};

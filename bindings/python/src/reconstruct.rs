@@ -5,6 +5,7 @@ use crate::camera::Camera;
 use crate::errors::{bad_type, bad_value, detached, from_library};
 use crate::gaussians::Gaussians;
 use crate::model::Model;
+use crate::renderer::chosen;
 use numpy::{PyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -28,7 +29,7 @@ type Points<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>);
 #[pyo3(signature = (
     images, masks, cameras, depths, *, prior, prior_model, head_model, calibrate, symmetry, relight, photo, cloud,
     vehicle_size, sh_degree, keep, check, points, budget, resolution, max_views, refine_iterations,
-    refine_seconds, refine_hold_out, threads, names, progress
+    refine_seconds, refine_hold_out, refine_backend, threads, names, progress
 ))]
 pub(crate) fn reconstruct<'py>(
     py: Python<'py>,
@@ -55,6 +56,7 @@ pub(crate) fn reconstruct<'py>(
     refine_iterations: Option<u32>,
     refine_seconds: Option<f64>,
     refine_hold_out: bool,
+    refine_backend: &str,
     threads: usize,
     names: Option<Vec<String>>,
     progress: Option<Py<PyAny>>,
@@ -76,7 +78,7 @@ pub(crate) fn reconstruct<'py>(
         max_views,
         threads,
         points,
-        refine: refinement(py, refine_iterations, refine_seconds, refine_hold_out)?,
+        refine: refinement(py, refine_iterations, refine_seconds, refine_hold_out, refine_backend)?,
         baseline: None,
         ignore_offset: false,
     };
@@ -118,7 +120,9 @@ fn refinement(
     iterations: Option<u32>,
     seconds: Option<f64>,
     hold_out: bool,
+    backend: &str,
 ) -> PyResult<Option<RefineOptions>> {
+    let backend = chosen(py, "refine_backend", backend)?;
     let amount = match (iterations, seconds) {
         (None, None) => return Ok(None),
         (Some(0), _) => return Err(bad_value(py, "refine_iterations", "0", "1 to 1000000")),
@@ -129,7 +133,7 @@ fn refinement(
             return Err(bad_value(py, "refine_seconds", &found, "one of both"));
         }
     };
-    let options = RefineOptions { amount, hold_out, ..RefineOptions::default() };
+    let options = RefineOptions { amount, hold_out, backend, ..RefineOptions::default() };
     match options.validate() {
         Err(vg::Error::Argument { argument, found, allowed }) => {
             let name = argument.trim_start_matches("options.").replace('.', "_");

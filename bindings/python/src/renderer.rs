@@ -21,12 +21,7 @@ impl Renderer {
     #[pyo3(signature = (gaussians, backend="auto"))]
     fn new(gaussians: &Bound<'_, Gaussians>, backend: &str) -> PyResult<Self> {
         let py = gaussians.py();
-        let backend = match backend {
-            "auto" => Backend::Auto,
-            "cpu" => Backend::Cpu,
-            "gpu" => Backend::Gpu,
-            other => return Err(bad_value(py, "backend", &format!("{other:?}"), "auto, cpu or gpu")),
-        };
+        let backend = chosen(py, "backend", backend)?;
         let shared = Arc::clone(&gaussians.get().inner);
         Ok(Self { ready: detached(py, || AssetRenderer::new(shared, backend))? })
     }
@@ -74,5 +69,15 @@ impl Renderer {
 
     fn __repr__(&self) -> String {
         format!("Renderer({})", self.ready.choice())
+    }
+}
+
+/// Who is asked to draw, of an argument of this name.
+pub(crate) fn chosen(py: Python<'_>, argument: &str, backend: &str) -> PyResult<Backend> {
+    match backend {
+        "auto" => Ok(Backend::Auto),
+        "cpu" => Ok(Backend::Cpu),
+        "gpu" => Ok(Backend::Gpu),
+        other => Err(bad_value(py, argument, &format!("{other:?}"), "auto, cpu or gpu")),
     }
 }

@@ -149,6 +149,7 @@ def test_options_are_those_of_the_extension_module(ellipsoid: Views, made: vg.Re
         "max_views": 3,
         "refine_iterations": 3,
         "refine_hold_out": True,
+        "refine_backend": "cpu",
     }
     ours, theirs = vg.reconstruct(*views, **given), capi.reconstruct(*views, **given)
     assert same_bytes(ours.gaussians, theirs.gaussians)
@@ -158,6 +159,7 @@ def test_options_are_those_of_the_extension_module(ellipsoid: Views, made: vg.Re
     refinement = ours.report["refinement"]
     assert refinement == theirs.report["refinement"] and refinement["iterations"] == 3
     assert refinement["held_out"]["view"] == "001"
+    assert refinement["drawn_by"].startswith("cpu (") and refinement["drawn_by"].endswith("): asked for")
     # The settings are what a budget chose; the budget itself is in the plan.
     assert ours.report["plan"]["budget_s"] == theirs.report["plan"]["budget_s"] == given["budget"]
     # Another order in memory is copied; no points are no cloud.

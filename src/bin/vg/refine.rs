@@ -35,6 +35,7 @@ pub(crate) fn run(args: &RefineArgs) -> Result {
         amount: args.amount,
         hold_out: args.hold_out,
         densify: args.densify.then(Densify::of_refinement),
+        backend: args.backend,
         ..RefineOptions::default()
     };
     let bar = Bar::of_refinement();

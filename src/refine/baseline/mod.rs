@@ -41,7 +41,7 @@ pub(crate) fn fit(
     let extent_m = start::extent_m(views, start);
     let mut state = State::of(start, &[], views.len());
     let mut work =
-        Work::new(&state, views, &settings, Measures { noise: NOISE, extent_m, seed: options.seed });
+        Work::new(&state, views, &settings, Measures { noise: NOISE, extent_m, seed: options.seed })?;
     work.show_degree(0);
     let (before, _) = work.begin(&state, context)?;
     let round = views.len() as u32;
@@ -76,6 +76,7 @@ pub(crate) fn fit(
         held_out: None,
         exposures: vec![[1.0; 3]; views.len()],
         densified: work.densified(),
+        drawn_by: work.drawn_by(),
     };
     Ok((work.finished(&state, context), report))
 }

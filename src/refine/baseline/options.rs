@@ -4,6 +4,7 @@ use super::super::densify::{Densify, MOST};
 use super::super::{Amount, Rates, RefineOptions};
 use crate::error::{Error, Result};
 use crate::gaussians::sh;
+use crate::render::Backend;
 use serde::Serialize;
 
 /// Settings of 3D Gaussian splatting as a baseline; the defaults are the original's but for the length, which
@@ -85,6 +86,7 @@ impl BaselineOptions {
             exposure: false,
             hold_out: false,
             densify: self.densify,
+            backend: Backend::Auto,
         }
     }
 

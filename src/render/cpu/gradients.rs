@@ -178,6 +178,17 @@ impl Differentiable for CpuRenderer {
         self.pool().push(scratch);
         Ok(out)
     }
+
+    fn both_ways(
+        &self,
+        gaussians: &Gaussians,
+        camera: &Camera,
+        options: &RenderOptions,
+        targets: (&mut Rendered, &mut PictureGradient, &mut Gradients),
+        loss: &mut dyn FnMut(&Rendered, &mut PictureGradient) -> Result<()>,
+    ) -> Result<()> {
+        self.render_with_gradients_into(gaussians, camera, options, targets, loss).map(drop)
+    }
 }
 
 /// Without drawing the picture first.

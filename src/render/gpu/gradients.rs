@@ -291,6 +291,17 @@ impl Differentiable for GpuRenderer {
         })?;
         Ok(out)
     }
+
+    fn both_ways(
+        &self,
+        gaussians: &Gaussians,
+        camera: &Camera,
+        options: &RenderOptions,
+        targets: (&mut Rendered, &mut PictureGradient, &mut Gradients),
+        loss: &mut dyn FnMut(&Rendered, &mut PictureGradient) -> Result<()>,
+    ) -> Result<()> {
+        self.render_with_gradients_into(gaussians, camera, options, targets, loss)
+    }
 }
 
 /// `scale` times the gradient of `count` pixels from row `first_row` on: red, green, blue, alpha, depth of each.

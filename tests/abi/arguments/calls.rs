@@ -1255,6 +1255,8 @@ fn options(context: usize) -> Lent {
         refine_seconds: refine_seconds(),
         refine_iterations: vec![(0, Fine), (2, Fine), (1_000_001, Refused), (u64::from(u32::MAX), Refused)],
         refine_hold_out: choice(&[0, 1]),
+        refine_backend: choice_without(&[0, 1], 2),
+        refine_flags: reserved(),
     });
     let mut lent = Lent::zeroed::<vg_options>("vg_options", fields);
     lent.put("context", 0, context as u64);

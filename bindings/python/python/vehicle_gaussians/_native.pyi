@@ -325,6 +325,7 @@ def reconstruct(
     refine_iterations: int | None,
     refine_seconds: float | None,
     refine_hold_out: bool,
+    refine_backend: str,
     threads: int,
     names: Sequence[str] | None,
     progress: Callable[[str, float], object] | None,

@@ -63,6 +63,7 @@ def reconstruct(
     refine_iterations: int | None = None,
     refine_seconds: float | None = None,
     refine_hold_out: bool = False,
+    refine_backend: Literal["auto", "cpu", "gpu"] = "auto",
     threads: int = 0,
     names: Iterable[str] | None = None,
     progress: Callable[[str, float], object] | None = None,
@@ -98,6 +99,7 @@ def reconstruct(
     refine_iterations, refine_seconds: optimise the model against the photographs, by so many steps, or by as many as fit
     into about so many seconds; the report tells how many that were. Beside a budget, not within it.
     refine_hold_out: one of three or more views takes no part in that and tells when to stop.
+    refine_backend: who draws and goes back in it; "auto" is what is known to pay, at present the processor.
     threads: worker threads; 0 means one per core. The result is the same with any number.
     names: of the views, for messages and the report.
     progress: called as progress(stage, fraction) on this thread; a true return value cancels (a VgError with code
@@ -127,6 +129,7 @@ def reconstruct(
         refine_iterations=refine_iterations,
         refine_seconds=refine_seconds,
         refine_hold_out=refine_hold_out,
+        refine_backend=refine_backend,
         threads=threads,
         names=None if names is None else list(names),
         progress=progress,

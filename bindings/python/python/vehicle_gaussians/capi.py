@@ -227,6 +227,8 @@ class vg_options(ct.Structure):
         ("refine_seconds", ct.c_double),
         ("refine_iterations", ct.c_uint32),
         ("refine_hold_out", ct.c_int32),
+        ("refine_backend", ct.c_int32),
+        ("refine_flags", ct.c_uint32),
     )
 
 
@@ -1149,6 +1151,7 @@ def reconstruct(
     refine_iterations: int | None = None,
     refine_seconds: float | None = None,
     refine_hold_out: bool = False,
+    refine_backend: Literal["auto", "cpu", "gpu"] = "auto",
     names: Iterable[str] | None = None,
     progress: Callable[[str, float], object] | None = None,
     log: Callable[[LogLevel, str], object] | None = None,
@@ -1211,6 +1214,7 @@ def reconstruct(
             raise VgError(Status.ARGUMENT, f"refine_seconds: {refine_seconds}; allowed: above 0, at most 86400")
         options.refine_seconds = refine_seconds
     options.refine_hold_out = refine_hold_out
+    options.refine_backend = _choice(Backend, "refine_backend", refine_backend)
     if cloud is not None:
         _expect(cloud, "cloud", np.float32)
         if cloud.ndim != 2 or cloud.shape[1] != 3:

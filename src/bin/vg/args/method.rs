@@ -1,6 +1,6 @@
 //! How a reconstruction is made, as options of the command line.
 
-use super::values::{VehicleSize, at_least_one, positive, refinement, share, vehicle_size};
+use super::values::{VehicleSize, at_least_one, backend, positive, refinement, share, vehicle_size};
 use crate::job::{self, Failure, USAGE};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
@@ -9,6 +9,7 @@ use vg::pipeline::{Calibrate, Keep, Options, PriorChoice};
 use vg::refine::baseline::BaselineOptions;
 use vg::refine::{Amount, Densify, RefineOptions};
 use vg::relight::Relight;
+use vg::render::Backend;
 use vg::symmetry::SymmetryMode;
 
 /// How a reconstruction is made; shared by `reconstruct` and `eval`.
@@ -75,6 +76,10 @@ pub(crate) struct MethodArgs {
     /// Let Gaussians divide and go in the optimisation, as 3D Gaussian splatting does
     #[arg(long, requires = "refine")]
     refine_densify: bool,
+    /// Who draws and goes back in the optimisation: the processor, a graphics processor in a build that has one, or what
+    /// is known to pay (auto: the processor)
+    #[arg(long, requires = "refine", value_name = "auto|cpu|gpu", default_value = "auto", value_parser = backend)]
+    refine_backend: Backend,
     /// Fit another method to the input views instead, for comparison: 3D Gaussian splatting from a random start or from
     /// --cloud, without any prior; --refine tells how long (2000)
     #[arg(long, value_enum, value_name = "METHOD", conflicts_with_all = NOT_OF_A_BASELINE)]
@@ -88,7 +93,7 @@ pub(crate) struct MethodArgs {
 }
 
 /// Arguments of what a baseline has not.
-const NOT_OF_A_BASELINE: [&str; 14] = [
+const NOT_OF_A_BASELINE: [&str; 15] = [
     "prior",
     "prior_model",
     "head_model",
@@ -101,6 +106,7 @@ const NOT_OF_A_BASELINE: [&str; 14] = [
     "budget",
     "refine_hold_out",
     "refine_densify",
+    "refine_backend",
     "no_photo",
     "depth_scale",
 ];
@@ -185,6 +191,7 @@ impl MethodArgs {
                 amount,
                 hold_out: self.refine_hold_out,
                 densify: self.refine_densify.then(Densify::of_refinement),
+                backend: self.refine_backend,
                 ..RefineOptions::default()
             }),
             baseline: self.baseline.map(|Baseline::GaussianSplatting| {

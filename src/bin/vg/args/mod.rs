@@ -122,6 +122,10 @@ pub(crate) struct RefineArgs {
     /// Let Gaussians divide and go, as 3D Gaussian splatting does
     #[arg(long)]
     pub(crate) densify: bool,
+    /// Who draws and goes back: the processor, a graphics processor in a build that has one, or what is known to pay
+    /// (auto: the processor)
+    #[arg(long, value_name = "auto|cpu|gpu", default_value = "auto", value_parser = backend)]
+    pub(crate) backend: Backend,
     /// Worker threads; 0 means one per core
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) threads: usize,
