@@ -2,7 +2,8 @@
 
 use crate::arrays::{array, borrowed, owned, shape_text, similarity, values, vector};
 use crate::camera::Camera;
-use crate::errors::{bad_type, bad_value, from_library, pooled};
+use crate::errors::{bad_type, bad_value, detached, from_library, pooled};
+use crate::renderer::chosen;
 use numpy::ndarray::ArrayView;
 use numpy::{Element, PyArray, PyArray1, PyArray2, PyArray3, PyArrayDescr, PyArrayDescrMethods};
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
@@ -12,8 +13,9 @@ use pyo3::types::{PyString, PyType};
 use std::path::PathBuf;
 use std::sync::{Arc, LazyLock};
 use vg::io::ply;
+use vg::render::backend::{Trainer, trainer};
 use vg::render::{
-    Background, CpuRenderer, DepthMode, Differentiable, PictureGradient, RenderOptions, Rendered, Renderer,
+    Backend, Background, CpuRenderer, DepthMode, PictureGradient, RenderOptions, Rendered, Renderer,
 };
 
 /// Draws for everybody: keeps its working memory, and the last lens, from picture to picture.
@@ -155,12 +157,13 @@ impl Gaussians {
 
     /// The picture as losses look at it: Planes of color (height, width, 3), over the background or, with a
     /// "transparent" one, premultiplied; alpha and depth (height, width). All float32; arguments as those of render,
-    /// and depth_mode, "expected" or "accumulated": depth times alpha.
+    /// and depth_mode, "expected" or "accumulated": depth times alpha. backend is "cpu", "gpu", an error without, or
+    /// "auto", the CPU: Renderer is for Gaussians that are drawn many times.
     #[pyo3(signature = (
         camera, background=None, threads=0, *,
-        antialiased=false, near=0.01, far=1e10, sh_degree=3, depth_mode="expected"
+        antialiased=false, near=0.01, far=1e10, sh_degree=3, depth_mode="expected", backend="auto"
     ), text_signature = "(self, camera, background='white', threads=0, *, antialiased=False, near=0.01, far=1e10, \
-        sh_degree=3, depth_mode='expected')")]
+        sh_degree=3, depth_mode='expected', backend='auto')")]
     fn render_planes<'py>(
         &self,
         py: Python<'py>,
@@ -172,11 +175,14 @@ impl Gaussians {
         far: f32,
         sh_degree: u8,
         depth_mode: &str,
+        backend: &str,
     ) -> PyResult<Bound<'py, PyAny>> {
         let options =
             RenderOptions { antialiased, near, far, sh_degree, ..planes(py, background, depth_mode)? };
         let camera = &camera.get().inner;
-        let drawn = pooled(py, threads, || RENDERER.render(&self.inner, camera, &options))?;
+        let device = device(py, backend)?;
+        let renderer = device.as_deref().unwrap_or(&*RENDERER);
+        let drawn = pooled(py, threads, || renderer.render(&self.inner, camera, &options))?;
         let size = (drawn.height as usize, drawn.width as usize);
         static PLANES: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         PLANES.import(py, "vehicle_gaussians._gradients", "Planes")?.call1((
@@ -193,9 +199,9 @@ impl Gaussians {
     /// Constants are the order of depth, the pixels a Gaussian reaches, what is too faint to be drawn, near and far.
     #[pyo3(signature = (
         camera, color=None, alpha=None, depth=None, background=None, threads=0, *,
-        antialiased=false, near=0.01, far=1e10, sh_degree=3, depth_mode="expected"
+        antialiased=false, near=0.01, far=1e10, sh_degree=3, depth_mode="expected", backend="auto"
     ), text_signature = "(self, camera, color=None, alpha=None, depth=None, background='white', threads=0, *, \
-        antialiased=False, near=0.01, far=1e10, sh_degree=3, depth_mode='expected')")]
+        antialiased=False, near=0.01, far=1e10, sh_degree=3, depth_mode='expected', backend='auto')")]
     fn render_backward<'py>(
         &self,
         py: Python<'py>,
@@ -210,6 +216,7 @@ impl Gaussians {
         far: f32,
         sh_degree: u8,
         depth_mode: &str,
+        backend: &str,
     ) -> PyResult<Bound<'py, PyAny>> {
         let options =
             RenderOptions { antialiased, near, far, sh_degree, ..planes(py, background, depth_mode)? };
@@ -225,7 +232,9 @@ impl Gaussians {
             alpha: plane::<1>(alpha, "alpha", size)?,
             depth: plane::<1>(depth, "depth", size)?,
         };
-        let g = pooled(py, threads, || RENDERER.backward(&self.inner, camera, &options, &gradient))?;
+        let device = device(py, backend)?;
+        let renderer = device.as_deref().unwrap_or(&*RENDERER);
+        let g = pooled(py, threads, || renderer.backward(&self.inner, camera, &options, &gradient))?;
         let n = self.inner.len();
         let pose = [g.pose.rotation, g.pose.translation].map(|v| v.to_array()).concat();
         static GRADIENTS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
@@ -334,6 +343,14 @@ pub(crate) fn parse_background(object: &Bound<'_, PyAny>) -> PyResult<Background
             let allowed = "white, black, transparent, or (r, g, b) from 0 to 1";
             Err(bad_value(object.py(), "background", &format!("{other:?}"), allowed))
         }
+    }
+}
+
+/// The graphics processor, where it is asked for.
+fn device(py: Python<'_>, backend: &str) -> PyResult<Option<Trainer>> {
+    match chosen(py, "backend", backend)? {
+        Backend::Gpu => Ok(Some(detached(py, || trainer(Backend::Gpu))?.0)),
+        Backend::Auto | Backend::Cpu => Ok(None),
     }
 }
 

@@ -78,6 +78,6 @@ pub(crate) fn chosen(py: Python<'_>, argument: &str, backend: &str) -> PyResult<
         "auto" => Ok(Backend::Auto),
         "cpu" => Ok(Backend::Cpu),
         "gpu" => Ok(Backend::Gpu),
-        other => Err(bad_value(py, argument, &format!("{other:?}"), "auto, cpu or gpu")),
+        other => Err(bad_value(py, argument, &format!("{other:?}"), "auto, cpu, gpu")),
     }
 }

@@ -233,7 +233,7 @@ def test_a_renderer_draws_the_same_and_says_who_did(made: vg.Reconstruction, ell
         expected = made.gaussians.render(camera, background)
         np.testing.assert_array_equal(ready.render(camera, background), expected)
     assert vg.Renderer(made.gaussians).backend in ("cpu", "gpu")
-    with pytest.raises(vg.VgError, match='backend: "cuda"; allowed: auto, cpu or gpu'):
+    with pytest.raises(vg.VgError, match='backend: "cuda"; allowed: auto, cpu, gpu'):
         vg.Renderer(made.gaussians, "cuda")  # type: ignore[arg-type]
     with pytest.raises(vg.VgError, match="gpu is not in this build|graphics processor"):
         raise_unless_gpu(made.gaussians)

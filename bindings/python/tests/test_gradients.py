@@ -128,6 +128,12 @@ def test_bad_planes_are_named(face: Any, arrays: Any, camera: vg.Camera, planes:
         g.render_backward(camera, alpha=planes.alpha, depth_mode="median")
     with pytest.raises(vg.VgError, match="^depth_mode: "):
         g.render_planes(camera, depth_mode="median")
+    for call in (g.render_planes, lambda c, **o: g.render_backward(c, alpha=planes.alpha, **o)):
+        with pytest.raises(vg.VgError, match="^backend: .cuda.; allowed: auto, cpu, gpu"):
+            call(camera, backend="cuda")
+        # A wheel without graphics processors says so.
+        with pytest.raises(vg.VgError, match="backend: gpu is not in this build"):
+            call(camera, backend="gpu")
     for name in ("color", "alpha", "depth"):
         spoiled = getattr(planes, name).copy()
         spoiled[7, 11, ...] = np.nan

@@ -181,6 +181,7 @@ class Gaussians:
         far: float = 1e10,
         sh_degree: int = 3,
         depth_mode: str = "expected",
+        backend: Literal["auto", "cpu", "gpu"] = "auto",
     ) -> Planes: ...
     def render_backward(
         self,
@@ -196,6 +197,7 @@ class Gaussians:
         far: float = 1e10,
         sh_degree: int = 3,
         depth_mode: str = "expected",
+        backend: Literal["auto", "cpu", "gpu"] = "auto",
     ) -> Gradients: ...
     @property
     def means(self) -> npt.NDArray[np.float32]: ...

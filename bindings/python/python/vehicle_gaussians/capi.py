@@ -938,12 +938,14 @@ class Gaussians:
         *,
         antialiased: bool = False,
         depth_mode: Literal["expected", "accumulated"] = "expected",
+        backend: Literal["auto", "cpu", "gpu"] = "auto",
         context: Context | None = None,
     ) -> Planes:
         """The picture as losses look at it: colour over the background or premultiplied, alpha, and depth."""
         posed, target = _camera(camera), _initial(vg_image_target)
         options = _render_options(background, antialiased, context)
         options.alpha, options.depth_mode = Alpha.PREMULTIPLIED, _choice(DepthMode, "depth_mode", depth_mode)
+        options.backend = _choice(Backend, "backend", backend)
         size = (posed.height, posed.width)
         picture, alpha, depth = np.empty((*size, 4), np.float32), np.empty(size, np.float32), np.empty(size, np.float32)
         target.width, target.height, target.color_format = posed.width, posed.height, Format.RGBA32F
@@ -961,6 +963,7 @@ class Gaussians:
         *,
         antialiased: bool = False,
         depth_mode: Literal["expected", "accumulated"] = "expected",
+        backend: Literal["auto", "cpu", "gpu"] = "auto",
         context: Context | None = None,
     ) -> Gradients:
         """Gradients of everything a picture is made of, from those of a loss with respect to its planes; the arguments
@@ -968,6 +971,7 @@ class Gaussians:
         posed, gradient, out = _camera(camera), _initial(vg_image_gradient), _initial(vg_gradients)
         options = _render_options(background, antialiased, context)
         options.alpha, options.depth_mode = Alpha.PREMULTIPLIED, _choice(DepthMode, "depth_mode", depth_mode)
+        options.backend = _choice(Backend, "backend", backend)
         gradient.width, gradient.height = size = (posed.width, posed.height)
         alive: list[Any] = []
         for name, array, channels in (("color", color, (3,)), ("alpha", alpha, ()), ("depth", depth, ())):

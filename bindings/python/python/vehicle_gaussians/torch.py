@@ -58,6 +58,7 @@ def render(
     far: float = 1e10,
     sh_degree: int = 3,
     depth_mode: Literal["expected", "accumulated"] = "expected",
+    backend: Literal["auto", "cpu", "gpu"] = "auto",
     threads: int = 0,
 ) -> Picture:
     """Draws Gaussians as a camera sees them; gradients go to every tensor that requires them.
@@ -100,6 +101,7 @@ def render(
         "far": far,
         "sh_degree": sh_degree,
         "depth_mode": depth_mode,
+        "backend": backend,
         "threads": threads,
     }
     drawn = _Render.apply(means, rotations, scales, opacities, sh, background, pose, camera, settings)
