@@ -5,11 +5,16 @@ mod common;
 use common::gpu::renderer;
 use common::gradients::noise;
 use common::scenes::{looking_at_origin, random, surfel_car};
+use common::vehicle::right_side;
 use common::{compare, is_finite};
 use glam::{DMat3, DVec3};
+use std::ops::ControlFlow;
+use std::process::Command;
 use std::sync::Arc;
 use vg::geometry::Distortion;
 use vg::geometry::camera::Intrinsics;
+use vg::pipeline::{Options, PriorChoice, reconstruct};
+use vg::refine::{Amount, RefineOptions};
 use vg::render::gpu::Bounds;
 use vg::render::{
     Adapter, AssetRenderer, Backend, Background, CpuRenderer, DepthMode, Differentiable, GpuRenderer,
@@ -393,6 +398,96 @@ fn an_asset_is_drawn_by_whom_it_was_asked_of_and_by_the_cpu_when_the_device_goes
     // Whoever comes next gets a new device.
     let next = AssetRenderer::new(gaussians, Backend::Gpu).unwrap();
     assert_close("next", &next.render(&camera, &options()).unwrap(), &expected, 1e-6, 2e-5);
+}
+
+#[test]
+fn a_refinement_on_the_device_is_as_good_and_gives_the_same_bytes_again() {
+    if renderer().is_none() {
+        return;
+    }
+    let scene = right_side(64, 48);
+    let run = |backend: Backend| {
+        let amount = Amount::Iterations(30);
+        let refine = Some(RefineOptions { amount, backend, ..RefineOptions::default() });
+        let options = Options { prior: PriorChoice::Given, refine, threads: 2, ..Options::default() };
+        reconstruct(&scene, &options, &mut |_| ControlFlow::Continue(())).unwrap()
+    };
+    let of = |backend: Backend| run(backend).report.refinement.unwrap();
+    let (cpu, gpu) = (of(Backend::Cpu), of(Backend::Gpu));
+    assert!(cpu.drawn_by.starts_with("cpu (") && gpu.drawn_by.starts_with("gpu ("), "{}", gpu.drawn_by);
+    println!("{:?} and {:?} dB", cpu.psnr_db, gpu.psnr_db);
+    assert!(gpu.psnr_db[1] > gpu.psnr_db[0] + 0.5, "{:?}", gpu.psnr_db);
+    assert!((gpu.psnr_db[1] - cpu.psnr_db[1]).abs() < 0.1, "{:?} {:?}", gpu.psnr_db, cpu.psnr_db);
+    assert!(run(Backend::Gpu).gaussians == run(Backend::Gpu).gaussians);
+}
+
+/// Says in a process of its own what a device, or its absence, comes to: for the test below.
+#[test]
+fn what_there_is() {
+    if std::env::var_os(ASKED).is_none() {
+        return;
+    }
+    let many = Arc::new(random(15, 20_000, 0, [0.01, 0.1]));
+    let camera = looking_at_origin(32, 24, DVec3::X, 7.0);
+    match GpuRenderer::new(Adapter::Any) {
+        Ok(gpu) => println!("\n> device: {}", gpu.render(&many, &camera, &options()).unwrap().alpha.len()),
+        Err(e) => println!("\n> error: {e}"),
+    }
+    let auto = AssetRenderer::new(many, Backend::Auto).unwrap();
+    assert_eq!(auto.render(&camera, &options()).unwrap().alpha.len(), 32 * 24);
+    println!("> auto: {}", auto.choice());
+}
+
+const ASKED: &str = "VG_TEST_WHAT_THERE_IS";
+
+#[test]
+fn drivers_that_are_missing_or_broken_are_errors_or_the_cpu_with_a_note_and_print_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let manifest = |library: &str| {
+        let icd = format!(r#"{{"library_path": "{library}", "api_version": "1.3.0"}}"#);
+        format!(r#"{{"file_format_version": "1.0.0", "ICD": {icd}}}"#)
+    };
+    let none = folder.path().join("none.json").to_str().unwrap().to_owned();
+    let cases = [
+        ("no driver", none),
+        ("no manifest", file("text.json", "not JSON")),
+        ("no library", file("gone.json", &manifest("/nowhere/libvulkan_gone.so"))),
+        ("another library", file("other.json", &manifest("libc.so.6"))),
+    ];
+    let ask = |variables: &[(&str, &str)]| {
+        let mut command = Command::new(std::env::current_exe().unwrap());
+        command.args(["what_there_is", "--exact", "--nocapture"]).env(ASKED, "1");
+        // Without it lavapipe complains on standard error.
+        command.env("XDG_RUNTIME_DIR", folder.path());
+        let out = command.envs(variables.iter().copied()).output().unwrap();
+        let said = String::from_utf8(out.stdout).unwrap();
+        assert!(out.status.success(), "{variables:?}: {said}{}", String::from_utf8_lossy(&out.stderr));
+        assert_eq!(String::from_utf8(out.stderr).unwrap(), "", "{variables:?}");
+        let lines = said.lines().filter_map(|line| line.strip_prefix("> ")).map(str::to_owned);
+        let [device, auto] = lines.collect::<Vec<_>>().try_into().unwrap();
+        println!("{variables:?}: {device}; {auto}");
+        (device, auto)
+    };
+    for (name, driver) in &cases {
+        let (device, auto) = ask(&[("VK_DRIVER_FILES", driver), ("VK_ICD_FILENAMES", driver)]);
+        assert!(device.starts_with("error: graphics processor: no Vulkan driver;"), "{name}: {device}");
+        assert!(auto.starts_with("auto: cpu (") && auto.contains("no Vulkan driver"), "{name}: {auto}");
+    }
+    let Some(gpu) = renderer() else { return };
+    let (device, _) = ask(&[("WGPU_ADAPTER_NAME", "nobody's")]);
+    let expected = format!("none of WGPU_ADAPTER_NAME \"nobody's\" among {}", gpu.name());
+    assert!(device.contains(&expected), "{device}");
+    let (device, auto) = ask(&[]);
+    assert_eq!(device, "device: 768");
+    match gpu.is_software() {
+        true => assert!(auto.starts_with("auto: cpu (") && auto.contains("draw on the CPU"), "{auto}"),
+        false => assert!(auto.starts_with("auto: gpu ("), "{auto}"),
+    }
 }
 
 #[test]

@@ -47,15 +47,16 @@ impl Device {
         let instance = wgpu::Instance::new(description);
         let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::VULKAN));
         let names: Vec<String> = adapters.iter().map(|a| a.get_info().name).collect();
-        if let Ok(name) = std::env::var("WGPU_ADAPTER_NAME") {
-            adapters.retain(|a| a.get_info().name.to_lowercase().contains(&name.to_lowercase()));
+        let chosen = std::env::var("WGPU_ADAPTER_NAME").ok();
+        if let Some(name) = &chosen {
+            adapters.retain(|a| contains(&a.get_info().name, name));
         }
         adapters.retain(|a| {
             a.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
                 && (wanted == Adapter::Any || is_hardware(&a.get_info()))
         });
         adapters.sort_by_key(|a| rank(a.get_info().device_type));
-        let Some(adapter) = adapters.first() else { return Err(none(wanted, &names)) };
+        let Some(adapter) = adapters.first() else { return Err(none(wanted, &names, chosen.as_deref())) };
         let info = adapter.get_info();
         let limits = adapter.limits();
         let opened = adapter.request_device(&wgpu::DeviceDescriptor {
@@ -180,9 +181,18 @@ fn rank(kind: wgpu::DeviceType) -> u32 {
     }
 }
 
-fn none(wanted: Adapter, names: &[String]) -> Error {
+/// Whether an adapter's name has this part, whatever the case.
+fn contains(name: &str, part: &str) -> bool {
+    name.to_lowercase().contains(&part.to_lowercase())
+}
+
+fn none(wanted: Adapter, names: &[String], chosen: Option<&str>) -> Error {
     let found = match (names, wanted) {
         ([], _) => "no Vulkan driver".to_owned(),
+        (names, _) if chosen.is_some_and(|chosen| !names.iter().any(|n| contains(n, chosen))) => {
+            let chosen = chosen.unwrap_or_default();
+            format!("none of WGPU_ADAPTER_NAME {chosen:?} among {}", names.join(", "))
+        }
         (names, Adapter::Hardware) => format!("none among {}, which draw on the CPU", names.join(", ")),
         (names, Adapter::Any) => format!("none that can be used among {}", names.join(", ")),
     };
