@@ -81,7 +81,7 @@ impl CpuRenderer {
     /// The way back from what pixels have for each Gaussian, where they were drawn and summed up elsewhere; the
     /// camera is valid and has no lens.
     #[cfg(feature = "gpu")]
-    pub(in crate::render) fn from_pixels(
+    pub(in crate::render) fn back_to_gaussians(
         &self,
         gaussians: &Gaussians,
         camera: &Camera,
@@ -93,10 +93,10 @@ impl CpuRenderer {
         match self.level {
             #[cfg(target_arch = "x86_64")]
             Level::Avx2(simd) => {
-                backward::from_pixels(simd, gaussians, camera, options, shares, decided, out);
+                backward::back_to_gaussians(simd, gaussians, camera, options, shares, decided, out);
             }
             Level::Portable(simd) => {
-                backward::from_pixels(simd, gaussians, camera, options, shares, decided, out);
+                backward::back_to_gaussians(simd, gaussians, camera, options, shares, decided, out);
             }
         }
     }

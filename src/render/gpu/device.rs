@@ -84,7 +84,7 @@ impl Device {
             let why = if message.is_empty() { format!("{reason:?}") } else { message };
             locked(&of_loss).lost.get_or_insert(why);
         });
-        let largest_binding = u64::from(limits.max_storage_buffer_binding_size).min(limits.max_buffer_size);
+        let largest_binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         Ok(Self { device, queue, info, largest_binding, trouble })
     }
 

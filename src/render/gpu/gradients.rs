@@ -111,7 +111,7 @@ impl GpuRenderer {
             let has = |bit: u32| flags & bit != 0;
             Decided { pivot_x: has(1), color_moves: [has(2), has(4), has(8)] }
         };
-        self.cpu.from_pixels(gaussians, camera, options, &shares, decided, out);
+        self.cpu.back_to_gaussians(gaussians, camera, options, &shares, decided, out);
         Ok(())
     }
 

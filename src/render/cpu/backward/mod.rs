@@ -116,7 +116,7 @@ pub(super) fn backward<S: Lanes>(
 
     let start = Instant::now();
     let shares = Shares { sums, background, scale };
-    from_pixels(simd, gaussians, camera, options, &shares, |i| Decided::of(&splats[i]), out);
+    back_to_gaussians(simd, gaussians, camera, options, &shares, |i| Decided::of(&splats[i]), out);
     times.project = start.elapsed();
     times
 }
@@ -131,7 +131,7 @@ pub(in crate::render) struct Shares<'a> {
 }
 
 /// From pixels to what made them: through the projection and the colour of each Gaussian that drew.
-pub(super) fn from_pixels<S: Lanes>(
+pub(super) fn back_to_gaussians<S: Lanes>(
     simd: S,
     gaussians: &Gaussians,
     camera: &Camera,

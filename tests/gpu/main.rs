@@ -1,5 +1,7 @@
 //! The renderer on a graphics processor against the f64 reference and the CPU's, and what may go wrong with a device.
 
+mod c_abi;
+#[path = "../common/mod.rs"]
 mod common;
 
 use common::gpu::renderer;
@@ -10,7 +12,7 @@ use common::{compare, is_finite};
 use glam::{DMat3, DVec3};
 use std::ops::ControlFlow;
 use std::process::Command;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use vg::geometry::Distortion;
 use vg::geometry::camera::Intrinsics;
 use vg::pipeline::{Options, PriorChoice, reconstruct};
@@ -21,6 +23,12 @@ use vg::render::{
     Gradients, Reference, RenderOptions, Rendered, Renderer,
 };
 use vg::{Camera, Gaussians, Pose};
+
+/// Held by tests of the device that the process shares: one of them loses it.
+fn alone() -> MutexGuard<'static, ()> {
+    static SHARED: Mutex<()> = Mutex::new(());
+    SHARED.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 const UNIT: [f32; 4] = [1.0, 0.0, 0.0, 0.0];
 
@@ -163,12 +171,14 @@ fn bands_slices_chunks_and_repetition_change_no_byte() {
     assert!(expected.alpha.iter().any(|a| *a > 0.9));
     assert_eq!(gpu.render_asset(&asset, &camera, &options()).unwrap(), expected, "a second time");
     assert_eq!(gpu.render(&gaussians, &camera, &options()).unwrap(), expected, "uploaded again");
-    let mut alter: Vec<(&str, Box<dyn Fn(GpuRenderer) -> GpuRenderer>)> = Vec::new();
-    alter.push(("bands", Box::new(|gpu| gpu.bounded(|b| b.pixels = 200 * 40))));
-    alter.push(("slices", Box::new(|gpu| gpu.bounded(|b| b.pairs = 1000))));
-    alter.push(("chunks", Box::new(|gpu| gpu.bounded(|b| b.binding = 1 << 18))));
-    for (name, alter) in alter {
-        let found = alter(renderer().unwrap()).render(&gaussians, &camera, &options()).unwrap();
+    let bounded = |change: fn(&mut Bounds)| renderer().unwrap().bounded(change);
+    let altered = [
+        ("bands", bounded(|b| b.pixels = 200 * 40)),
+        ("slices", bounded(|b| b.pairs = 1000)),
+        ("chunks", bounded(|b| b.binding = 1 << 18)),
+    ];
+    for (name, gpu) in altered {
+        let found = gpu.render(&gaussians, &camera, &options()).unwrap();
         assert!(found == expected, "{name}");
     }
 }
@@ -375,6 +385,7 @@ fn an_asset_is_drawn_by_whom_it_was_asked_of_and_by_the_cpu_when_the_device_goes
     if renderer().is_none() {
         return;
     }
+    let _alone = alone();
     let gaussians = Arc::new(random(14, 300, 1, [0.01, 0.1]));
     let camera = looking_at_origin(64, 48, DVec3::new(0.3, -1.0, 0.2), 6.0);
     let cpu = AssetRenderer::new(Arc::clone(&gaussians), Backend::Cpu).unwrap();
@@ -405,6 +416,7 @@ fn a_refinement_on_the_device_is_as_good_and_gives_the_same_bytes_again() {
     if renderer().is_none() {
         return;
     }
+    let _alone = alone();
     let scene = right_side(64, 48);
     let run = |backend: Backend| {
         let amount = Amount::Iterations(30);
