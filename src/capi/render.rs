@@ -295,7 +295,7 @@ struct Pixel {
     alpha: vg_alpha,
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 enum Layout {
     Rgb8,
     Bgr8,
@@ -362,6 +362,27 @@ impl Target {
         let depth = plane(&named("depth"), target.depth, target.depth_row_stride)?;
         let alpha = plane(&named("alpha"), target.alpha, target.alpha_row_stride)?;
         Ok(Self { color, depth, alpha })
+    }
+
+    /// Whether bytes are all that is wanted, and [`Rgba8`](crate::render::Rgba8) has them.
+    pub(super) fn takes_bytes(&self) -> bool {
+        let Self { color: Some((_, _, pixel)), depth: None, alpha: None } = self else { return false };
+        pixel.layout != Layout::Rgba32f && (pixel.opaque || pixel.alpha == vg_alpha::Straight)
+    }
+
+    /// As [`Target::write`], of a picture of bytes, `width` to a row.
+    pub(super) unsafe fn write_bytes(&self, rgba: &[[u8; 4]], width: u32) {
+        let Some((first, stride, pixel)) = self.color else { return };
+        let size = pixel.layout.bytes();
+        for (v, row) in rgba.chunks_exact(width as usize).enumerate() {
+            let target = unsafe { std::slice::from_raw_parts_mut(first.add(v * stride), row.len() * size) };
+            for (bytes, &[r, g, b, a]) in target.chunks_exact_mut(size).zip(row) {
+                match pixel.layout {
+                    Layout::Bgr8 | Layout::Bgra8 => bytes.copy_from_slice(&[b, g, r, a][..size]),
+                    _ => bytes.copy_from_slice(&[r, g, b, a][..size]),
+                }
+            }
+        }
     }
 
     /// Copies the picture row by row, through slices of one row each: the gaps are not ours.

@@ -8,7 +8,7 @@ use super::read::{self, Versioned};
 use super::render::{Target, backend, vg_backend, vg_image_target, vg_render_options};
 use super::status::{c_string, vg_error, vg_status};
 use crate::error::Error;
-use crate::render::{AssetRenderer, Backend};
+use crate::render::{AssetRenderer, Backend, Rgba8};
 use std::ffi::{CString, c_char};
 use std::sync::{Mutex, PoisonError};
 
@@ -141,8 +141,15 @@ pub unsafe extern "C" fn vg_renderer_render(
                 pictures.push((camera, Target::read(&name, target, &settings, alpha, width, height)?));
             }
             in_context(options.context, |shop| {
+                let mut bytes = Rgba8::default();
                 shop.with_picture(|picture| {
                     for (camera, target) in &pictures {
+                        // Of the CPU's planes the bytes are made on the way to the target.
+                        if target.takes_bytes() && object.ready.choice().backend == Backend::Gpu {
+                            shop.threads.run(|| object.ready.render_rgba8(camera, &settings, &mut bytes))?;
+                            target.write_bytes(&bytes.pixels, camera.width);
+                            continue;
+                        }
                         shop.threads.run(|| object.ready.render_into(camera, &settings, picture))?;
                         target.write(picture);
                     }

@@ -3,7 +3,7 @@
 #[cfg(not(feature = "gpu"))]
 use super::backend::not_built;
 use super::backend::{Backend, Choice, is_built};
-use super::{CpuRenderer, RenderOptions, Rendered};
+use super::{CpuRenderer, RenderOptions, Rendered, Rgba8};
 #[cfg(feature = "gpu")]
 use crate::error::Error;
 use crate::error::Result;
@@ -109,6 +109,19 @@ impl AssetRenderer {
         }
         self.cpu.render_into(&self.gaussians, camera, options, target)?;
         Ok(())
+    }
+
+    /// As [`AssetRenderer::render_into`], into a picture of 8 bits: less to fetch from a device.
+    pub fn render_rgba8(&self, camera: &Camera, options: &RenderOptions, target: &mut Rgba8) -> Result<()> {
+        #[cfg(feature = "gpu")]
+        if let Some(device) = self.device() {
+            match device.renderer.render_asset_rgba8(&device.asset, camera, options, target) {
+                Err(e @ Error::Missing { .. }) if self.may_fall_back => self.fall_back(&e),
+                done => return done,
+            }
+        }
+        target
+            .make(options, |planes| self.cpu.render_into(&self.gaussians, camera, options, planes).map(drop))
     }
 
     #[cfg(feature = "gpu")]

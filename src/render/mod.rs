@@ -20,7 +20,7 @@ pub use cpu::CpuRenderer;
 pub use gpu::{Adapter, GpuAsset, GpuRenderer};
 pub use gradient::{Differentiable, Gradients, PictureGradient, PoseGradient};
 pub use options::{Background, DepthMode, RenderOptions};
-pub use output::Rendered;
+pub use output::{Rendered, Rgba8};
 pub use reference::{Reference, ReferenceGradients};
 
 use crate::error::Result;

@@ -8,7 +8,7 @@ use std::ffi::CStr;
 use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 use vg::capi::*;
-use vg::render::{Background, Differentiable, RenderOptions, Renderer};
+use vg::render::{Background, Differentiable, GpuRenderer, RenderOptions, Renderer, Rgba8};
 use vg::{Camera, Gaussians};
 
 const WIDTH: u32 = 61;
@@ -51,6 +51,15 @@ unsafe fn handle(g: &Gaussians) -> *mut vg_gaussians {
         assert_eq!(vg_gaussians_from_arrays(&arrays, &mut out, null_mut()), vg_status::Ok);
     }
     out
+}
+
+/// The picture over the background of the test.
+fn ready_bytes(gpu: &GpuRenderer, gaussians: &Gaussians, camera: &Camera) -> Vec<[u8; 4]> {
+    let options =
+        RenderOptions { background: Background::Color([0.2, 0.4, 0.6]), ..RenderOptions::default() };
+    let mut bytes = Rgba8::default();
+    gpu.render_asset_rgba8(&gpu.upload(gaussians).unwrap(), camera, &options, &mut bytes).unwrap();
+    bytes.pixels
 }
 
 #[test]
@@ -107,6 +116,37 @@ fn c_gets_the_devices_pictures_and_gradients() {
             }
         }
 
+        // Bytes, in each order.
+        let whole = ready_bytes(&gpu, &gaussians, &cameras[0]);
+        how.alpha = vg_alpha::Straight as i32;
+        for (format, size, order) in [
+            (vg_format::Rgba8, 4, [0, 1, 2, 3]),
+            (vg_format::Bgra8, 4, [2, 1, 0, 3]),
+            (vg_format::Rgb8, 3, [0, 1, 2, 3]),
+            (vg_format::Bgr8, 3, [2, 1, 0, 3]),
+        ] {
+            how.background = vg_background::Color as i32;
+            how.background_color = [0.2, 0.4, 0.6];
+            let stride = WIDTH as usize * size + 5;
+            let mut bytes = vec![77u8; stride * HEIGHT as usize];
+            let mut target = initial(vg_image_target_init);
+            (target.width, target.height) = (WIDTH, HEIGHT);
+            (target.color, target.color_row_stride) = (bytes.as_mut_ptr().cast(), stride);
+            target.color_format = format as i32;
+            let status = vg_renderer_render(ready, c_cameras.as_ptr(), 1, &how, &target, null_mut());
+            assert_eq!(status, vg_status::Ok);
+            for (v, row) in bytes.chunks_exact(stride).enumerate() {
+                let (pixels, gap) = row.split_at(WIDTH as usize * size);
+                assert!(gap == [77; 5]);
+                for (u, found) in pixels.chunks_exact(size).enumerate() {
+                    let pixel = whole[v * WIDTH as usize + u];
+                    assert!(found.iter().zip(order).all(|(byte, c)| *byte == pixel[c]), "{format:?}");
+                }
+            }
+        }
+
+        how.background = vg_background::Transparent as i32;
+        how.alpha = vg_alpha::Premultiplied as i32;
         let gradient = noise(5, &cameras[0]);
         let expected = gpu.backward(&gaussians, &cameras[0], &settings, &gradient).unwrap();
         let mut planes = initial(vg_image_gradient_init);

@@ -20,7 +20,7 @@ use vg::refine::{Amount, RefineOptions};
 use vg::render::gpu::Bounds;
 use vg::render::{
     Adapter, AssetRenderer, Backend, Background, CpuRenderer, DepthMode, Differentiable, GpuRenderer,
-    Gradients, Reference, RenderOptions, Rendered, Renderer,
+    Gradients, Reference, RenderOptions, Rendered, Renderer, Rgba8,
 };
 use vg::{Camera, Gaussians, Pose};
 
@@ -239,6 +239,39 @@ fn gradients_are_the_same_bytes_in_bands_windows_and_repeated_walks() {
     ] {
         let difference: Vec<f32> = a.iter().zip(b).map(|(a, b)| a - b).collect();
         assert!(largest(&difference) <= 1e-5 * largest(b), "{:e}", largest(&difference));
+    }
+}
+
+#[test]
+fn bytes_are_those_of_the_planes_rounded() {
+    let Some(gpu) = renderer() else { return };
+    let gaussians = random(17, 3000, 2, [0.005, 0.2]);
+    let camera = looking_at_origin(200, 150, DVec3::new(0.4, -1.0, 0.3), 5.0);
+    let distortion = Distortion::Brown { k: [-0.1, 0.03, 0.0, 0.0, 0.0, 0.0], p: [0.01, -0.02] };
+    let slices = renderer().unwrap().bounded(|b| (b.pairs, b.pixels) = (1000, 200 * 40));
+    for gpu in [gpu, slices] {
+        let asset = gpu.upload(&gaussians).unwrap();
+        for camera in [camera, Camera { distortion, ..camera }] {
+            for background in [Background::Transparent, Background::Color([0.1, 0.2, 0.3])] {
+                let options = RenderOptions { background, ..RenderOptions::default() };
+                let planes = gpu.render_asset(&asset, &camera, &options).unwrap();
+                let mut bytes = Rgba8::default();
+                gpu.render_asset_rgba8(&asset, &camera, &options, &mut bytes).unwrap();
+                match background {
+                    Background::Color(_) => {
+                        let expected = planes.to_rgb8().into_iter().map(|[r, g, b]| [r, g, b, 255]);
+                        assert!(bytes.pixels == expected.collect::<Vec<_>>());
+                    }
+                    Background::Transparent => {
+                        // The device divides by alpha less exactly: one level, where it was a tie.
+                        let expected = planes.to_rgba8();
+                        let pairs = bytes.pixels.as_flattened().iter().zip(expected.as_flattened());
+                        let off = pairs.clone().filter(|(a, b)| a != b).count();
+                        assert!(off < 20 && pairs.into_iter().all(|(a, b)| a.abs_diff(*b) <= 1), "{off}");
+                    }
+                }
+            }
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use crate::errors::{bad_value, detached, pooled};
 use crate::gaussians::{Gaussians, parse_background, picture};
 use pyo3::prelude::*;
 use std::sync::Arc;
-use vg::render::{AssetRenderer, Backend, Background, RenderOptions};
+use vg::render::{AssetRenderer, Backend, Background, RenderOptions, Rgba8};
 
 /// Gaussians made ready to be drawn many times. backend is "auto", a graphics processor where this build and this
 /// machine have one and there are 20,000 Gaussians or more, else the CPU; "cpu"; or "gpu", an error without. Under
@@ -59,11 +59,13 @@ impl Renderer {
         let options =
             RenderOptions { background, antialiased, near, far, sh_degree, ..RenderOptions::default() };
         let camera = &camera.get().inner;
-        let drawn = pooled(py, threads, || self.ready.render(camera, &options))?;
-        let size = (drawn.height as usize, drawn.width as usize);
+        let mut drawn = Rgba8::default();
+        pooled(py, threads, || self.ready.render_rgba8(camera, &options, &mut drawn))?;
+        let size = (camera.height as usize, camera.width as usize);
+        let rgb = |&[r, g, b, _]: &[u8; 4]| [r, g, b];
         Ok(match background {
-            Background::Color(_) => picture(py, size, drawn.to_rgb8()),
-            Background::Transparent => picture(py, size, drawn.to_rgba8()),
+            Background::Color(_) => picture(py, size, drawn.pixels.iter().map(rgb).collect()),
+            Background::Transparent => picture(py, size, drawn.pixels),
         })
     }
 

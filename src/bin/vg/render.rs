@@ -10,7 +10,7 @@ use std::sync::Arc;
 use vg::geometry::Intrinsics;
 use vg::io::{self, NamedCamera, image, ply};
 use vg::progress::Threads;
-use vg::render::{AssetRenderer, Background, RenderOptions, Rendered};
+use vg::render::{AssetRenderer, Background, RenderOptions, Rendered, Rgba8};
 use vg::{Camera, Gaussians, Pose};
 
 /// The turntable's camera looks down on the vehicle by this much, radians (12 degrees).
@@ -46,10 +46,14 @@ pub(crate) fn run(args: &RenderArgs) -> Result {
     let threads = Threads::new(args.threads)?;
     let ready = AssetRenderer::new(Arc::new(gaussians), args.backend)?;
     let bar = Bar::of_pictures(cameras.len());
+    let mut bytes = Rgba8::default();
     for (i, named) in cameras.iter().enumerate() {
-        let drawn = threads.run(|| ready.render(&named.camera, &options))?;
-        write(&pictures[i], &drawn, options.background)?;
-        if args.depth {
+        if !args.depth {
+            threads.run(|| ready.render_rgba8(&named.camera, &options, &mut bytes))?;
+            write_bytes(&pictures[i], [named.camera.width, named.camera.height], &bytes.pixels, &options)?;
+        } else {
+            let drawn = threads.run(|| ready.render(&named.camera, &options))?;
+            write(&pictures[i], &drawn, options.background)?;
             let beyond = image::write_depth16(&depths[i], drawn.width, drawn.height, &drawn.depth)?;
             if beyond > 0 {
                 let path = depths[i].display();
@@ -61,6 +65,23 @@ pub(crate) fn run(args: &RenderArgs) -> Result {
     drop(bar);
     let (folder, n) = (args.output.display(), cameras.len());
     Ok(Outcome::done(format!("{folder}: {n} pictures by {}", ready.choice())))
+}
+
+/// As [`write`], of a picture of 8 bits.
+fn write_bytes(
+    path: &Path,
+    [width, height]: [u32; 2],
+    rgba: &[[u8; 4]],
+    options: &RenderOptions,
+) -> Result<()> {
+    match options.background {
+        Background::Color(_) => {
+            let rgb: Vec<[u8; 3]> = rgba.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
+            image::write_rgb8(path, width, height, &rgb)?;
+        }
+        Background::Transparent => image::write_rgba8(path, width, height, rgba)?,
+    }
+    Ok(())
 }
 
 /// An opaque picture, or one with its own alpha on a transparent background.

@@ -10,6 +10,13 @@ use crate::error::Result;
 use crate::geometry::Camera;
 use crate::render::{RenderOptions, Rendered};
 
+/// Where a picture goes.
+pub(super) enum Target<'a> {
+    Planes(&'a mut Rendered),
+    /// RGBA, 8 bits each.
+    Bytes(&'a mut Vec<[u8; 4]>),
+}
+
 impl GpuRenderer {
     /// Of a valid camera without a lens.
     pub(super) fn draw(
@@ -17,12 +24,12 @@ impl GpuRenderer {
         asset: &GpuAsset,
         camera: &Camera,
         options: &RenderOptions,
-        target: &mut Rendered,
+        mut target: Target,
     ) -> Result<()> {
         let mut held = self.lock();
         // What an error left is not to be trusted: it is taken, and put back when all went well.
         let mut memory = held.take().unwrap_or_else(|| Memory::new(&self.device));
-        self.draw_bands(asset, camera, options, &mut memory, target)?;
+        self.draw_bands(asset, camera, options, &mut memory, &mut target)?;
         *held = Some(memory);
         Ok(())
     }
@@ -33,12 +40,12 @@ impl GpuRenderer {
         camera: &Camera,
         options: &RenderOptions,
         memory: &mut Memory,
-        target: &mut Rendered,
+        target: &mut Target,
     ) -> Result<()> {
         let (mut frame, depth_bits) = self.frame(asset, camera, options, memory);
         let whole = Rows { first: 0, count: frame.tile_rows };
         let most = self.rows_of_a_band(camera);
-        resize(target, camera);
+        target.resize(camera);
 
         memory.for_band(&self.device, tiles(camera, most), pixels(camera, Rows { count: most, ..whole }));
         for first in (0..whole.count).step_by(most as usize) {
@@ -73,24 +80,25 @@ impl GpuRenderer {
         frame: &mut Frame,
         depth_bits: u32,
         memory: &mut Memory,
-        target: &mut Rendered,
+        target: &mut Target,
     ) -> Result<()> {
         let rows = Rows { first: frame.first_tile_row, count: frame.tile_rows };
         // A splat has at most one pair per tile: a slice holds one at least.
         let most_pairs = self.bounds.pairs.max(tiles(camera, rows.count));
         let mut wanted = first_guess(asset, most_pairs);
-        (frame.slice_start, frame.is_first, frame.is_last) = (0, 1, 1);
+        let last = target.last();
+        (frame.slice_start, frame.is_first, frame.is_last) = (0, 1, last);
         loop {
             memory.for_pairs(&self.device, wanted);
             let slice = self.draw_slice(asset, camera, frame, depth_bits, memory, target)?;
             let all_fit = slice.pairs <= frame.pair_capacity;
-            if frame.is_last == 1 && all_fit {
+            if frame.is_last != 0 && all_fit {
                 return Ok(());
             }
-            if frame.is_last == 1 {
+            if frame.is_last != 0 {
                 // Nothing is drawn yet that counts: once more with room for all, or in slices.
                 let needed = u64::from(slice.pairs).next_power_of_two();
-                frame.is_last = u32::from(needed <= most_pairs);
+                frame.is_last = if needed <= most_pairs { last } else { 0 };
                 wanted = needed.min(most_pairs);
                 continue;
             }
@@ -98,7 +106,7 @@ impl GpuRenderer {
             frame.slice_start = slice.end;
             if all_fit || !slice.is_unfinished {
                 // An empty slice completes the picture.
-                (frame.slice_start, frame.is_last) = (u32::MAX, 1);
+                (frame.slice_start, frame.is_last) = (u32::MAX, last);
             }
         }
     }
@@ -111,7 +119,7 @@ impl GpuRenderer {
         frame: &mut Frame,
         depth_bits: u32,
         memory: &mut Memory,
-        target: &mut Rendered,
+        target: &mut Target,
     ) -> Result<Slice> {
         let Memory { counters, gaussian: Some(per), pair: Some(pair), band: Some(band), .. } = &*memory
         else {
@@ -126,6 +134,7 @@ impl GpuRenderer {
         let rows = Rows { first: frame.first_tile_row, count: frame.tile_rows };
         let tile_bits = bits_of(tiles(camera, rows.count) as u32);
         let pixels = pixels(camera, rows);
+        let wanted = (frame.is_last != 0).then(|| target.part(pixels));
         let mut stages = Stages::new(&self.device, &self.kernels);
         let splats_of = (asset.id, frame.of_splats());
         if memory.splats_of != Some(splats_of) {
@@ -135,17 +144,18 @@ impl GpuRenderer {
         stages.list_pairs(counters, per, pair, depth_bits);
         stages.sort_by_tile(per, pair, band, tile_bits);
         stages.blend(frame, counters, per, pair, band, tile_bits);
-        stages.read_back(counters, per, band, (frame.is_last == 1).then_some(pixels));
+        stages.read_back(counters, per, band, wanted);
         stages.submit();
 
         let mut numbers = [0u32; 3];
         let first = (rows.first * TILE) as usize * camera.width as usize;
         let take = |i: usize, bytes: &[u8]| match i {
             0 => bytemuck::bytes_of_mut(&mut numbers).copy_from_slice(bytes),
-            _ => write_band(target, first, bytes),
+            _ => target.write(first, bytes),
         };
-        let buffers = [(&counters.readback, 12), (&band.readback, PIXEL * pixels)];
-        self.device.read(&buffers[..if frame.is_last == 1 { 2 } else { 1 }], take)?;
+        let [_, bytes] = wanted.unwrap_or_default();
+        let buffers = [(&counters.readback, 12), (&band.readback, bytes)];
+        self.device.read(&buffers[..if wanted.is_some() { 2 } else { 1 }], take)?;
         let [pairs, end, unfinished] = numbers;
         memory.splats_of = Some(splats_of);
         let is_whole = frame.slice_start == 0 && pairs <= frame.pair_capacity;
@@ -194,21 +204,52 @@ pub(super) fn pixels(camera: &Camera, rows: Rows) -> u64 {
     u64::from(camera.width) * u64::from(last - rows.first * TILE)
 }
 
-fn resize(target: &mut Rendered, camera: &Camera) {
-    let pixels = camera.width as usize * camera.height as usize;
-    (target.width, target.height) = (camera.width, camera.height);
-    target.color.resize(pixels, [0.0; 3]);
-    target.alpha.resize(pixels, 0.0);
-    target.depth.resize(pixels, 0.0);
-}
+impl Target<'_> {
+    /// What `Frame::is_last` is of its last slice.
+    fn last(&self) -> u32 {
+        match self {
+            Self::Planes(_) => 1,
+            Self::Bytes(_) => 2,
+        }
+    }
 
-/// The planes of a band, one after the other in `bytes`, from pixel `first` on.
-fn write_band(target: &mut Rendered, first: usize, bytes: &[u8]) {
-    let pixels = bytes.len() / PIXEL as usize;
-    let (color, rest) = bytes.split_at(12 * pixels);
-    let (alpha, depth) = rest.split_at(4 * pixels);
-    let band = first..first + pixels;
-    bytemuck::cast_slice_mut(&mut target.color[band.clone()]).copy_from_slice(color);
-    bytemuck::cast_slice_mut(&mut target.alpha[band.clone()]).copy_from_slice(alpha);
-    bytemuck::cast_slice_mut(&mut target.depth[band]).copy_from_slice(depth);
+    /// Which bytes of a band's picture are wanted: from where, and how many.
+    fn part(&self, pixels: u64) -> [u64; 2] {
+        match self {
+            Self::Planes(_) => [0, PIXEL * pixels],
+            // The plane of depth.
+            Self::Bytes(_) => [16 * pixels, 4 * pixels],
+        }
+    }
+
+    fn resize(&mut self, camera: &Camera) {
+        let pixels = camera.width as usize * camera.height as usize;
+        match self {
+            Self::Planes(picture) => {
+                (picture.width, picture.height) = (camera.width, camera.height);
+                picture.color.resize(pixels, [0.0; 3]);
+                picture.alpha.resize(pixels, 0.0);
+                picture.depth.resize(pixels, 0.0);
+            }
+            Self::Bytes(rgba) => rgba.resize(pixels, [0; 4]),
+        }
+    }
+
+    /// A band's pixels from `first` on; planes come one after the other.
+    fn write(&mut self, first: usize, bytes: &[u8]) {
+        match self {
+            Self::Planes(picture) => {
+                let pixels = bytes.len() / PIXEL as usize;
+                let (color, rest) = bytes.split_at(12 * pixels);
+                let (alpha, depth) = rest.split_at(4 * pixels);
+                let band = first..first + pixels;
+                bytemuck::cast_slice_mut(&mut picture.color[band.clone()]).copy_from_slice(color);
+                bytemuck::cast_slice_mut(&mut picture.alpha[band.clone()]).copy_from_slice(alpha);
+                bytemuck::cast_slice_mut(&mut picture.depth[band]).copy_from_slice(depth);
+            }
+            Self::Bytes(rgba) => {
+                rgba[first..first + bytes.len() / 4].as_flattened_mut().copy_from_slice(bytes);
+            }
+        }
+    }
 }

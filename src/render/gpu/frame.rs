@@ -54,9 +54,9 @@ impl Frame {
         let i = view.intrinsics;
         let rows = |part: fn(f64) -> f32| view.rotation.map(|row| triple(row.map(part)));
         let [x, y] = view.jacobian_range;
-        let [r, g, b] = match options.background {
-            Background::Color(rgb) => rgb,
-            Background::Transparent => [0.0; 3],
+        let background = match options.background {
+            Background::Color([r, g, b]) => [r, g, b, 1.0],
+            Background::Transparent => [0.0; 4],
         };
         Self {
             rotation: rows(|v| v as f32),
@@ -66,7 +66,7 @@ impl Frame {
             focal: [i.fx as f32, rest(i.fx), i.fy as f32, rest(i.fy)],
             principal: [i.cx as f32, rest(i.cx), i.cy as f32, rest(i.cy)],
             jacobian_range: [x[0] as f32, x[1] as f32, y[0] as f32, y[1] as f32],
-            background: [r, g, b, 0.0],
+            background,
             width: camera.width,
             height: camera.height,
             near: options.near,

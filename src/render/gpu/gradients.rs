@@ -5,7 +5,7 @@
 //! where the pairs' shares do not fit the walk is repeated for the next pairs. One walk is the rule.
 
 use super::asset::GpuAsset;
-use super::draw::{Rows, first_guess, pixels, tiles};
+use super::draw::{Rows, Target, first_guess, pixels, tiles};
 use super::frame::{Frame, TILE};
 use super::memory::{BACKGROUND, Memory, PIXEL, SHARE, SUMS};
 use super::stages::{Stages, bits_of};
@@ -68,14 +68,14 @@ impl GpuRenderer {
             of_picture.validate(camera)
         };
         if camera.distortion.is_none() {
-            self.draw(&asset, camera, options, picture)?;
+            self.draw(&asset, camera, options, Target::Planes(picture))?;
             let largest = largest(picture, of_picture)?;
             return self.back(&asset, gaussians, camera, options, (of_picture, largest), gradients);
         }
         let map = self.lens_map(camera)?;
         let (pinhole, fine) = map.pinhole(camera, options);
         let (mut fine_picture, mut of_fine) = (Rendered::default(), PictureGradient::default());
-        self.draw(&asset, &pinhole, &fine, &mut fine_picture)?;
+        self.draw(&asset, &pinhole, &fine, Target::Planes(&mut fine_picture))?;
         let background = map.loss(options, (&fine_picture, &mut of_fine), (picture, of_picture), largest)?;
         let largest = of_fine.validate(&pinhole)?;
         self.back(&asset, gaussians, &pinhole, &fine, (&of_fine, largest), gradients)?;

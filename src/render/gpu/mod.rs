@@ -21,8 +21,9 @@ use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
 use crate::geometry::Camera;
 use crate::render::distorted::LensMap;
-use crate::render::{CpuRenderer, RenderOptions, Rendered, Renderer};
+use crate::render::{CpuRenderer, RenderOptions, Rendered, Renderer, Rgba8};
 use device::Device;
+use draw::Target;
 use kernels::Kernels;
 use memory::{Memory, SPLAT};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
@@ -168,14 +169,30 @@ impl GpuRenderer {
         camera.validate("camera")?;
         options.validate()?;
         if camera.distortion.is_none() {
-            return self.draw(asset, camera, options, target);
+            return self.draw(asset, camera, options, Target::Planes(target));
         }
         *target = self.lens_map(camera)?.render_with(camera, options, |pinhole, fine| {
             let mut picture = Rendered::default();
-            self.draw(asset, pinhole, fine, &mut picture)?;
+            self.draw(asset, pinhole, fine, Target::Planes(&mut picture))?;
             Ok(picture)
         })?;
         Ok(())
+    }
+
+    /// As [`GpuRenderer::render_asset_into`] into the pixels of [`Rgba8`]: a fifth of the bytes come back from the device.
+    pub fn render_asset_rgba8(
+        &self,
+        asset: &GpuAsset,
+        camera: &Camera,
+        options: &RenderOptions,
+        target: &mut Rgba8,
+    ) -> Result<()> {
+        if !camera.distortion.is_none() {
+            return target.make(options, |planes| self.render_asset_into(asset, camera, options, planes));
+        }
+        camera.validate("camera")?;
+        options.validate()?;
+        self.draw(asset, camera, options, Target::Bytes(&mut target.pixels))
     }
 
     fn lens_map(&self, camera: &Camera) -> Result<Arc<LensMap>> {

@@ -6,7 +6,7 @@ use super::device::Device;
 use super::frame::Frame;
 use super::kernels::Kernels;
 use super::memory::{
-    BACKGROUND, Back, Counters, DIGIT_BITS, Entries, PIXEL, PerBand, PerGaussian, PerPair, SUMS, Sums,
+    BACKGROUND, Back, Counters, DIGIT_BITS, Entries, PerBand, PerGaussian, PerPair, SUMS, Sums,
 };
 
 /// Commands on their way to the device.
@@ -187,21 +187,22 @@ impl<'a> Stages<'a> {
         }
     }
 
-    /// Makes ready for the processor how the slice went and, where it was the last, the band's `pixels`.
+    /// Makes ready for the processor how the slice went and, where it was the last, this part of the band's picture: from
+    /// which byte, and how many.
     pub(super) fn read_back(
         &mut self,
         counters: &Counters,
         per: &PerGaussian,
         band: &PerBand,
-        pixels: Option<u64>,
+        part: Option<[u64; 2]>,
     ) {
         self.close();
         let numbers = [per.offsets.total(), &counters.slice_end, &counters.unfinished];
         for (i, from) in numbers.into_iter().enumerate() {
             self.encoder.copy_buffer_to_buffer(from, 0, &counters.readback, 4 * i as u64, 4);
         }
-        if let Some(pixels) = pixels {
-            self.encoder.copy_buffer_to_buffer(&band.picture, 0, &band.readback, 0, PIXEL * pixels);
+        if let Some([from, bytes]) = part {
+            self.encoder.copy_buffer_to_buffer(&band.picture, from, &band.readback, 0, bytes);
         }
     }
 

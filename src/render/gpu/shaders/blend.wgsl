@@ -8,8 +8,9 @@
 @group(0) @binding(4) var<storage, read> splats: array<Splat>;
 @group(0) @binding(5) var<storage, read> tints: array<vec4<f32>>;
 // The band's planes: colour [pixels][3], alpha [pixels], depth [pixels]. Between slices the plane of alpha holds the
-// transmittance, negative where the pixel is finished.
-@group(0) @binding(6) var<storage, read_write> picture: array<f32>;
+// transmittance, negative where the pixel is finished. A picture of bytes takes the plane of depth, and leaves the rest.
+// As bits: not every pattern of bytes is a float that survives.
+@group(0) @binding(6) var<storage, read_write> picture: array<u32>;
 // Whether a pixel is not finished.
 @group(0) @binding(7) var<storage, read_write> unfinished: array<atomic<u32>>;
 
@@ -19,6 +20,25 @@ var<workgroup> batch: array<Splat, PIXELS>;
 var<workgroup> batch_tints: array<vec4<f32>, PIXELS>;
 var<workgroup> live: atomic<u32>;
 var<workgroup> is_live: u32;
+
+// `is_last` of a picture of bytes.
+const BYTES: u32 = 2u;
+
+// Rounded, halves up; cut at 255.
+fn to_byte(v: f32) -> u32 {
+    let x = min(v * 255.0, 255.0);
+    let whole = floor(x);
+    return u32(whole) + select(0u, 1u, x - whole >= 0.5);
+}
+
+// Red in the lowest byte. On no background colour is divided by alpha, on one alpha is 255.
+fn rgba8(color: vec3<f32>, alpha: f32) -> u32 {
+    let is_opaque = frame.background.w != 0.0;
+    let straight = select(0.0, 1.0 / max(alpha, 1e-30), alpha > 0.0);
+    let c = color * select(straight, 1.0, is_opaque);
+    let a = select(to_byte(alpha), 255u, is_opaque);
+    return to_byte(c.x) | (to_byte(c.y) << 8u) | (to_byte(c.z) << 16u) | (a << 24u);
+}
 
 @compute @workgroup_size(PIXELS)
 fn blend(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
@@ -34,9 +54,10 @@ fn blend(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     var color = vec3(0.0);
     var depth = 0.0;
     if (frame.is_first == 0u && is_inside) {
-        color = vec3(picture[3u * pixel], picture[3u * pixel + 1u], picture[3u * pixel + 2u]);
-        t = picture[3u * pixels + pixel];
-        depth = picture[4u * pixels + pixel];
+        let rgb = vec3(picture[3u * pixel], picture[3u * pixel + 1u], picture[3u * pixel + 2u]);
+        color = bitcast<vec3<f32>>(rgb);
+        t = bitcast<f32>(picture[3u * pixels + pixel]);
+        depth = bitcast<f32>(picture[4u * pixels + pixel]);
     }
     let center = vec2(f32(x), f32(y)) + 0.5;
 
@@ -90,13 +111,18 @@ fn blend(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
         if (frame.expected_depth != 0u) {
             depth = select(0.0, depth / max(alpha, 1e-30), alpha > 0.0);
         }
+        if (frame.is_last == BYTES) {
+            picture[4u * pixels + pixel] = rgba8(color, alpha);
+            return;
+        }
         t = alpha;
     } else if (t > 0.0) {
         atomicStore(&unfinished[0], 1u);
     }
-    picture[3u * pixel] = color.x;
-    picture[3u * pixel + 1u] = color.y;
-    picture[3u * pixel + 2u] = color.z;
-    picture[3u * pixels + pixel] = t;
-    picture[4u * pixels + pixel] = depth;
+    let rgb = bitcast<vec3<u32>>(color);
+    picture[3u * pixel] = rgb.x;
+    picture[3u * pixel + 1u] = rgb.y;
+    picture[3u * pixel + 2u] = rgb.z;
+    picture[3u * pixels + pixel] = bitcast<u32>(t);
+    picture[4u * pixels + pixel] = bitcast<u32>(depth);
 }

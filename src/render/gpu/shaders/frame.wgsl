@@ -12,6 +12,7 @@ struct Frame {
     principal: vec4<f32>,
     // Range of x/z, then of y/z, in which the Jacobian is taken.
     jacobian_range: vec4<f32>,
+    // With 1 in the end, or nothing.
     background: vec4<f32>,
     // Pixels of the picture.
     width: u32,
@@ -36,7 +37,7 @@ struct Frame {
     // Rank in depth at which the slice begins, and how many (tile, splat) pairs it may have.
     slice_start: u32,
     pair_capacity: u32,
-    // Whether the slice is the first of the band, and the last.
+    // Whether the slice is the first of the band, and the last; 2: and the picture is to be bytes.
     is_first: u32,
     is_last: u32,
     // Bits of the smallest depth that can occur.
