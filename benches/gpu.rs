@@ -11,16 +11,23 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
+use common::gradients::{largest, noise, tensors};
 use common::scenes::{looking_at_origin, surfel_car};
 use common::timing::{median, ms};
 use common::{compare, scenes};
 use glam::DVec3;
 use std::time::{Duration, Instant};
 use vg::Gaussians;
-use vg::render::{Adapter, CpuRenderer, GpuRenderer, Reference, RenderOptions, Rendered, Renderer};
+use vg::render::{
+    Adapter, CpuRenderer, Differentiable, GpuRenderer, Gradients, PictureGradient, Reference, RenderOptions,
+    Rendered, Renderer, Rgba8,
+};
 
 /// Gaussians of the scene whose error is measured: 4e9 pixel-Gaussian pairs for the reference.
 const ERROR_GAUSSIANS: usize = 20_000;
+
+/// Of more, refinement is not asked for.
+const MOST_BOTH_WAYS: usize = 1_000_000;
 
 /// Seconds that the pictures of one row may take.
 const BUDGET: Duration = Duration::from_secs(6);
@@ -40,9 +47,22 @@ fn main() {
     println!("SH degree 3, {} threads beside it", rayon::current_num_threads());
     let cpu = CpuRenderer::new();
     print_error(&gpu);
+    println!("milliseconds; MiB; mean and largest difference of colour from the CPU's");
     println!(
-        "{:>10} {:>10} {:>10} {:>10} {:>9} {:>7} {:>11} {:>10} {:>10}",
-        "Gaussians", "pixels", "first", "gpu", "cpu", "ratio", "asset", "working", "uploaded"
+        "{:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>6} {:>8} {:>8} {:>6} {:>6} {:>7} {:>8}",
+        "Gaussians",
+        "pixels",
+        "first",
+        "planes",
+        "bytes",
+        "cpu",
+        "ratio",
+        "both",
+        "cpu",
+        "ratio",
+        "asset",
+        "working",
+        "upload"
     );
     for n in sizes {
         let gaussians = surfel_car(n);
@@ -52,43 +72,74 @@ fn main() {
     }
 }
 
+/// One line: a picture of planes, one of bytes, and a picture with its gradients, by the device and by the CPU in turns.
 fn row(gpu: &GpuRenderer, cpu: &CpuRenderer, gaussians: &Gaussians, width: u32, height: u32) {
-    let camera = looking_at_origin(width, height, DVec3::new(0.75, -0.55, 0.36), 8.0);
+    // In turns: of a view that was drawn last the device has the order already.
+    let cameras = [0.75, -0.75].map(|x| looking_at_origin(width, height, DVec3::new(x, -0.55, 0.36), 8.0));
     let options = RenderOptions::default();
-    let start = Instant::now();
-    let asset = gpu.upload(gaussians).unwrap_or_else(|e| panic!("{e}"));
-    let uploaded = start.elapsed();
-    let (mut by_gpu, mut by_cpu) = (Rendered::default(), Rendered::default());
-    let time = |work: &mut dyn FnMut()| {
-        let start = Instant::now();
-        work();
-        start.elapsed()
-    };
-    let mut draw = || gpu.render_asset_into(&asset, &camera, &options, &mut by_gpu).unwrap();
-    let first = time(&mut draw);
-    let (mut gpus, mut cpus) = (Vec::new(), Vec::new());
+    let (asset, uploaded) = timed(|| gpu.upload(gaussians).unwrap_or_else(|e| panic!("{e}")));
+    let (mut by_gpu, mut by_cpu, mut bytes) = (Rendered::default(), Rendered::default(), Rgba8::default());
+    let (_, first) = timed(|| gpu.render_asset_into(&asset, &cameras[1], &options, &mut by_gpu).unwrap());
+    let mut times: [Vec<Duration>; 5] = Default::default();
+    let (mut of_picture, mut gradients) = (PictureGradient::default(), Gradients::default());
     let begin = Instant::now();
-    while gpus.len() < 3 || (begin.elapsed() < BUDGET && gpus.len() < 50) {
-        gpus.push(time(&mut draw));
-        cpus.push(time(&mut || drop(cpu.render_into(gaussians, &camera, &options, &mut by_cpu))));
+    for i in 0.. {
+        if i >= 3 && (begin.elapsed() > BUDGET || i >= 50) {
+            break;
+        }
+        let camera = &cameras[i % 2];
+        let other = &cameras[(i + 1) % 2];
+        times[0].push(timed(|| gpu.render_asset_into(&asset, camera, &options, &mut by_gpu).unwrap()).1);
+        times[1].push(timed(|| gpu.render_asset_rgba8(&asset, other, &options, &mut bytes).unwrap()).1);
+        times[2].push(timed(|| cpu.render_into(gaussians, camera, &options, &mut by_cpu).unwrap()).1);
+        if gaussians.len() > MOST_BOTH_WAYS {
+            continue;
+        }
+        let renderers = [gpu as &dyn Differentiable, cpu];
+        for (renderer, times) in renderers.into_iter().zip(&mut times[3..]) {
+            let mut picture = Rendered::default();
+            let targets = (&mut picture, &mut of_picture, &mut gradients);
+            let way = || renderer.both_ways(gaussians, camera, &options, targets, &mut mean_square).unwrap();
+            times.push(timed(way).1);
+        }
     }
     let [color, ..] = compare(&by_gpu, &by_cpu);
-    let (gpu_time, cpu_time) = (median(&mut gpus), median(&mut cpus));
+    let [planes, bytes, by_cpu, back, cpu_back] =
+        times.map(|mut t| if t.is_empty() { f64::NAN } else { ms(median(&mut t)) });
     let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     println!(
-        "{:>10} {:>10} {:>7.1} ms {:>7.1} ms {:>6.1} ms {:>7.2} {:>7.0} MiB {:>6.0} MiB {:>7.1} ms   {:.1e} {:.1e}",
+        "{:>9} {:>9} {:>8.1} {:>8.1} {:>8.1} {:>8.1} {:>6.2} {:>8.1} {:>8.1} {:>6.2} {:>6.0} {:>7.0} {:>8.1}  {:.1e} {:.1e}",
         gaussians.len(),
         format!("{width}x{height}"),
         ms(first),
-        ms(gpu_time),
-        ms(cpu_time),
-        gpu_time.as_secs_f64() / cpu_time.as_secs_f64(),
+        planes,
+        bytes,
+        by_cpu,
+        planes / by_cpu,
+        back,
+        cpu_back,
+        back / cpu_back,
         mib(asset.bytes()),
         mib(gpu.working_bytes()),
         ms(uploaded),
         color.mean,
         color.max,
     );
+}
+
+fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
+    let start = Instant::now();
+    let made = work();
+    (made, start.elapsed())
+}
+
+/// Half the mean of the squares of everything a picture is.
+fn mean_square(p: &Rendered, g: &mut PictureGradient) -> vg::Result<()> {
+    let scale = 1.0 / p.alpha.len() as f32;
+    g.color.extend(p.color.iter().map(|c| c.map(|v| scale * v)));
+    g.alpha.extend(p.alpha.iter().map(|v| scale * v));
+    g.depth.extend(p.depth.iter().map(|v| scale * v));
+    Ok(())
 }
 
 fn print_error(gpu: &GpuRenderer) {
@@ -102,4 +153,21 @@ fn print_error(gpu: &GpuRenderer) {
          {:.1e}, depth {:.1e} {:.1e} m",
         color.mean, color.max, alpha.mean, alpha.max, depth.mean, depth.max
     );
+
+    let camera = scenes::looking_at_origin(256, 192, DVec3::new(0.75, -0.55, 0.36), 8.0);
+    let (gaussians, gradient) = (surfel_car(ERROR_GAUSSIANS / 10), noise(1, &camera));
+    let exact = Reference.backward_f64(&gaussians, &camera, &options, &gradient).unwrap();
+    print!("{} Gaussians, 256x192, gradients against the f64 reference:", gaussians.len());
+    for (name, renderer) in [("device", gpu as &dyn Differentiable), ("CPU", &CpuRenderer::new())] {
+        let found = renderer.backward(&gaussians, &camera, &options, &gradient).unwrap();
+        let of_tensor = |(name, found, exact): (&str, Vec<f64>, Vec<f64>)| {
+            let error: Vec<f64> = found.iter().zip(&exact).map(|(a, b)| a - b).collect();
+            (largest(&error) / largest(&exact), name.to_owned())
+        };
+        let worst =
+            tensors(&found, &exact, &camera).into_iter().map(of_tensor).max_by(|a, b| a.0.total_cmp(&b.0));
+        let (error, tensor) = worst.unwrap();
+        print!(" {name} {error:.1e} of the largest ({tensor}).");
+    }
+    println!();
 }

@@ -7,6 +7,7 @@ use common::golden::{camera, gaussians, golden};
 use common::gradients::{all_finite, difference, f64s, largest, largest_of, noise};
 use common::gradients::{loss_between, of_variable, sampled, tensors};
 use common::npz::Npz;
+use common::renderers::renderers;
 use common::scenes::{looking_at_origin, random};
 use common::stiff::{Stiff, stiff};
 use glam::DVec3;
@@ -17,18 +18,6 @@ use vg::render::reference::Parameters;
 use vg::render::{Background, CpuRenderer, DepthMode, Differentiable, Gradients, PictureGradient};
 use vg::render::{Reference, RenderOptions, Rendered, Renderer};
 use vg::{Camera, Gaussians, Pose};
-
-/// The renderers that are fast: the CPU's two, and the graphics processor's where it is built and there is one.
-fn renderers() -> Vec<(&'static str, Box<dyn Differentiable>)> {
-    let mut out: Vec<(&str, Box<dyn Differentiable>)> =
-        vec![("vector", Box::new(CpuRenderer::new())), ("portable", Box::new(CpuRenderer::portable()))];
-    #[cfg(feature = "gpu")]
-    if let Some(gpu) = common::gpu::renderer() {
-        out.push(("gpu", Box::new(gpu)));
-    }
-    out.reverse();
-    out
-}
 
 /// |a - b| / |b| as vectors.
 fn relative_l2(found: &[f64], expected: &[f64]) -> f64 {

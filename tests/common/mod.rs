@@ -7,6 +7,7 @@ pub mod golden;
 pub mod gpu;
 pub mod gradients;
 pub mod npz;
+pub mod renderers;
 pub mod sample;
 pub mod scenes;
 pub mod stiff;

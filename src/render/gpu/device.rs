@@ -118,6 +118,18 @@ impl Device {
         }
     }
 
+    /// What is said where a kernel found out that it was not run to its end.
+    pub(super) fn cuts_loops_short(&self) -> Error {
+        Error::Missing {
+            what: WHAT,
+            found: format!(
+                "{} leaves loops before their end, and a list of this picture is too long",
+                self.info.name
+            ),
+            remedy: "draw fewer Gaussians that lie behind each other, or draw on the CPU".into(),
+        }
+    }
+
     /// Ends the device, as a driver's reset would.
     pub(super) fn lose(&self) {
         self.device.destroy();

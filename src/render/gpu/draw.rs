@@ -10,6 +10,9 @@ use crate::error::Result;
 use crate::geometry::Camera;
 use crate::render::{RenderOptions, Rendered};
 
+/// Splats of a slice where the driver leaves loops before their end.
+const FEW: u32 = 1 << 15;
+
 /// Where a picture goes.
 pub(super) enum Target<'a> {
     Planes(&'a mut Rendered),
@@ -88,21 +91,33 @@ impl GpuRenderer {
         let mut wanted = first_guess(asset, most_pairs);
         let last = target.last();
         (frame.slice_start, frame.is_first, frame.is_last) = (0, 1, last);
+        frame.slice_splats = u32::MAX;
         loop {
             memory.for_pairs(&self.device, wanted);
             let slice = self.draw_slice(asset, camera, frame, depth_bits, memory, target)?;
-            let all_fit = slice.pairs <= frame.pair_capacity;
+            if slice.is_cut_short {
+                if frame.slice_splats == FEW {
+                    return Err(self.device.cuts_loops_short());
+                }
+                // Anew, in slices whose lists the driver goes through to the end.
+                frame.slice_splats = FEW;
+                (frame.slice_start, frame.is_first, frame.is_last) = (0, 1, 0);
+                continue;
+            }
+            let all_fit = slice.end == u32::MAX;
             if frame.is_last != 0 && all_fit {
                 return Ok(());
             }
             if frame.is_last != 0 {
-                // Nothing is drawn yet that counts: once more with room for all, or in slices.
+                // Nothing is drawn yet that counts: once more with room for all, or in slices. These grow: the first
+                // of them finish the pixels of what is opaque.
                 let needed = u64::from(slice.pairs).next_power_of_two();
                 frame.is_last = if needed <= most_pairs { last } else { 0 };
-                wanted = needed.min(most_pairs);
+                wanted = if needed <= most_pairs { needed } else { wanted };
                 continue;
             }
             frame.is_first = 0;
+            wanted = (4 * wanted).min(most_pairs);
             frame.slice_start = slice.end;
             if all_fit || !slice.is_unfinished {
                 // An empty slice completes the picture.
@@ -132,7 +147,8 @@ impl GpuRenderer {
         queue.write_buffer(&counters.unfinished, 0, bytemuck::bytes_of(&0u32));
 
         let rows = Rows { first: frame.first_tile_row, count: frame.tile_rows };
-        let tile_bits = bits_of(tiles(camera, rows.count) as u32);
+        let tiles = tiles(camera, rows.count);
+        let tile_bits = bits_of(tiles as u32);
         let pixels = pixels(camera, rows);
         let wanted = (frame.is_last != 0).then(|| target.part(pixels));
         let mut stages = Stages::new(&self.device, &self.kernels);
@@ -141,7 +157,7 @@ impl GpuRenderer {
             stages.project(asset, counters, per);
             stages.sort_by_depth(counters, per, depth_bits);
         }
-        stages.list_pairs(counters, per, pair, depth_bits);
+        stages.list_pairs(counters, per, pair, depth_bits, tiles);
         stages.sort_by_tile(per, pair, band, tile_bits);
         stages.blend(frame, counters, per, pair, band, tile_bits);
         stages.read_back(counters, per, band, wanted);
@@ -158,9 +174,9 @@ impl GpuRenderer {
         self.device.read(&buffers[..if wanted.is_some() { 2 } else { 1 }], take)?;
         let [pairs, end, unfinished] = numbers;
         memory.splats_of = Some(splats_of);
-        let is_whole = frame.slice_start == 0 && pairs <= frame.pair_capacity;
+        let is_whole = frame.slice_start == 0 && end == u32::MAX;
         memory.pairs_of = is_whole.then_some(((asset.id, frame.of_lists()), pairs));
-        Ok(Slice { pairs, end, is_unfinished: unfinished != 0 })
+        Ok(Slice { pairs, end, is_unfinished: unfinished & 1 != 0, is_cut_short: unfinished & 2 != 0 })
     }
 
     /// Rows of tiles that a band may have.
@@ -182,11 +198,12 @@ pub(super) struct Rows {
 
 /// How a slice went.
 struct Slice {
-    /// Those of all splats from its start on, whether they fitted or not.
+    /// Those of all its splats, whether they fitted or not.
     pairs: u32,
-    /// Rank of the first splat that did not fit.
+    /// Rank of the first splat that is not in it, or `u32::MAX`.
     end: u32,
     is_unfinished: bool,
+    is_cut_short: bool,
 }
 
 /// Room for pairs to begin with: one for each Gaussian, within bounds.

@@ -34,6 +34,7 @@ pub(super) struct Frame {
     pub(super) first_tile_row: u32,
     pub(super) tile_rows: u32,
     pub(super) slice_start: u32,
+    pub(super) slice_splats: u32,
     pub(super) pair_capacity: u32,
     pub(super) is_first: u32,
     pub(super) is_last: u32,
@@ -42,6 +43,8 @@ pub(super) struct Frame {
     pub(super) band_row: u32,
     pub(super) first_pair: u32,
     pub(super) held_pairs: u32,
+    /// A structure's size is a multiple of its largest vector's.
+    spare: [u32; 3],
 }
 
 /// Pixels along a tile's side, as in the shaders.
@@ -83,6 +86,7 @@ impl Frame {
             first_tile_row: 0,
             tile_rows: camera.height.div_ceil(TILE),
             slice_start: 0,
+            slice_splats: u32::MAX,
             pair_capacity: 0,
             is_first: 1,
             is_last: 1,
@@ -91,6 +95,7 @@ impl Frame {
             band_row: 0,
             first_pair: 0,
             held_pairs: 0,
+            spare: [0; 3],
         }
     }
 
@@ -98,6 +103,7 @@ impl Frame {
     pub(super) fn of_lists(&self) -> Self {
         Self {
             slice_start: 0,
+            slice_splats: u32::MAX,
             pair_capacity: 0,
             is_first: 1,
             is_last: 1,

@@ -201,7 +201,7 @@ impl GpuRenderer {
                 stages.sort_by_depth(counters, per, depth_bits);
             }
             if known.is_none() {
-                stages.list_pairs(counters, per, pair, depth_bits);
+                stages.list_pairs(counters, per, pair, depth_bits, window.tiles());
                 stages.sort_by_tile(per, pair, band, tile_bits);
             }
             stages.back(frame, counters, per, pair, band, back, [depth_bits, tile_bits]);
@@ -209,7 +209,7 @@ impl GpuRenderer {
             stages.read_backgrounds(back, window.tiles());
             stages.submit();
             let mut numbers = [0u32; 3];
-            let mut background = [0.0; 3];
+            let mut background = [0.0; 4];
             let take = |i: usize, bytes: &[u8]| match i {
                 0 => bytemuck::bytes_of_mut(&mut numbers).copy_from_slice(bytes),
                 _ => background = sum(bytes),
@@ -232,8 +232,12 @@ impl GpuRenderer {
                 stages.back(frame, counters, per, pair, band, back, [depth_bits, tile_bits]);
                 stages.submit();
             }
+            let [r, g, b, is_cut_short] = background;
+            if is_cut_short > 0.0 {
+                return Err(self.device.cuts_loops_short());
+            }
             (memory.splats_of, memory.pairs_of) = (Some(splats_of), Some((lists_of, pairs)));
-            return Ok(Some(background));
+            return Ok(Some([r, g, b]));
         }
     }
 
@@ -252,15 +256,20 @@ impl GpuRenderer {
         let mut stages = Stages::new(&self.device, &self.kernels);
         stages.read_sums(back);
         stages.submit();
-        let buffers: Vec<_> = back.sums.iter().map(|s| (&s.readback, SUMS * s.count as u64)).collect();
-        let mut first = 0;
+        let buffers: Vec<_> = back.sums.iter().map(|s| (&s.readback, SUMS * s.count as u64 + 4)).collect();
+        let (mut first, mut is_cut_short) = (0, false);
         self.device.read(&buffers, |i, bytes| {
             let chunk = first..first + back.sums[i].count;
-            let (of_sums, of_flags) = bytes.split_at(40 * chunk.len());
+            let (of_sums, rest) = bytes.split_at(40 * chunk.len());
+            let (of_flags, of_loops) = rest.split_at(4 * chunk.len());
+            is_cut_short |= of_loops != [0; 4];
             bytemuck::cast_slice_mut(&mut sums[chunk.clone()]).copy_from_slice(of_sums);
             bytemuck::cast_slice_mut(&mut flags[chunk.clone()]).copy_from_slice(of_flags);
             first = chunk.end;
         })?;
+        if is_cut_short {
+            return Err(self.device.cuts_loops_short());
+        }
         Ok((sums, flags))
     }
 }
@@ -320,11 +329,11 @@ fn stage(gradient: &PictureGradient, scale: f64, first_row: usize, count: usize,
     });
 }
 
-/// Of tiles' backgrounds, in their order.
-fn sum(bytes: &[u8]) -> [f64; 3] {
-    let mut total = [0.0; 3];
+/// Of tiles' backgrounds, in their order, and how many loops were left.
+fn sum(bytes: &[u8]) -> [f64; 4] {
+    let mut total = [0.0; 4];
     for tile in bytemuck::cast_slice::<u8, [f32; 4]>(bytes) {
-        for c in 0..3 {
+        for c in 0..4 {
             total[c] += f64::from(tile[c]);
         }
     }

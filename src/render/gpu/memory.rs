@@ -182,7 +182,7 @@ impl Back {
 
 impl SplatSums {
     fn new(device: &Device, first: usize, count: usize) -> Self {
-        let bytes = SUMS * count as u64;
+        let bytes = SUMS * count as u64 + 4;
         Self {
             count,
             range: uniform(device, "sums' range", bytemuck::cast_slice(&[first as u32, count as u32, 0, 0])),
@@ -307,7 +307,7 @@ impl Memory {
         self.back = None;
         let backgrounds = storage(device, "backgrounds", BACKGROUND * tiles);
         let backgrounds_readback = readable(device, "backgrounds to read", backgrounds.size());
-        let each = ((largest_binding / SUMS) as usize).max(1);
+        let each = ((largest_binding.saturating_sub(4) / SUMS) as usize).max(1);
         let sums = (0..count).step_by(each).map(|i| SplatSums::new(device, i, each.min(count - i))).collect();
         self.back = Some(Back {
             gradient: storage(device, "gradient", PIXEL * pixels),

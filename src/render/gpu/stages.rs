@@ -21,6 +21,9 @@ pub(super) struct Stages<'a> {
 /// What a kernel is given: the binding's number in its shader, and the buffer.
 type Binding<'b> = (u32, &'b wgpu::Buffer);
 
+/// As in `shaders/tiles.wgsl`.
+const PART: u64 = 32768;
+
 /// Bits in which numbers below `count` differ.
 pub(super) fn bits_of(count: u32) -> u32 {
     u32::BITS - count.saturating_sub(1).leading_zeros()
@@ -70,6 +73,7 @@ impl<'a> Stages<'a> {
         per: &PerGaussian,
         pair: &PerPair,
         depth_bits: u32,
+        tiles: u64,
     ) {
         let order = sorted(&per.depths, depth_bits);
         let drawn = per.depths.histogram.total();
@@ -84,10 +88,11 @@ impl<'a> Stages<'a> {
             (7, &counters.slice_end),
         ];
         let ranks = per.offsets.values.size() / 4;
-        let groups = [ranks.div_ceil(256) as u32, 1];
-        self.run(&self.kernels.cover, &bindings[..5], groups);
+        let groups = ranks.div_ceil(256) as u32;
+        self.run(&self.kernels.cover, &bindings[..5], [groups, 1]);
         self.sum(&per.offsets);
-        self.run(&self.kernels.emit, &bindings, groups);
+        // A splat has at most one pair per tile.
+        self.run(&self.kernels.emit, &bindings, [groups, tiles.div_ceil(PART) as u32]);
     }
 
     /// The pairs by tile, nearest first, and where each tile's begin.
@@ -182,7 +187,7 @@ impl<'a> Stages<'a> {
     pub(super) fn read_sums(&mut self, back: &Back) {
         self.close();
         for chunk in &back.sums {
-            let bytes = SUMS * chunk.count as u64;
+            let bytes = SUMS * chunk.count as u64 + 4;
             self.encoder.copy_buffer_to_buffer(&chunk.sums, 0, &chunk.readback, 0, bytes);
         }
     }

@@ -22,7 +22,7 @@
 // [held_pairs][10]: w, w t, w s, w t t, w t s, w s s, red, green, blue, depth; (t, s) is the offset whitened, with
 // q = t^2 + s^2.
 @group(0) @binding(7) var<storage, read_write> shares: array<f32>;
-// Of the window's tiles: the gradient of the background's colour.
+// Of the window's tiles: the gradient of the background's colour, and whether the driver left a loop before its end.
 @group(0) @binding(8) var<storage, read_write> backgrounds: array<vec4<f32>>;
 
 const PIXELS: u32 = TILE * TILE;
@@ -131,6 +131,9 @@ fn back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     }
     workgroupBarrier();
     atomicMax(&live, end);
+    if (lane == 3u) {
+        backgrounds[group.y * frame.tile_columns + group.x].w = 0.0;
+    }
     if (lane < 3u) {
         var sum = 0.0;
         for (var p = 0u; p < PIXELS; p++) {
@@ -235,5 +238,8 @@ fn back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             }
         }
         workgroupBarrier();
+    }
+    if (is_cut_short(frame.nothing)) {
+        backgrounds[group.y * frame.tile_columns + group.x].w = 1.0;
     }
 }

@@ -11,7 +11,7 @@
 // transmittance, negative where the pixel is finished. A picture of bytes takes the plane of depth, and leaves the rest.
 // As bits: not every pattern of bytes is a float that survives.
 @group(0) @binding(6) var<storage, read_write> picture: array<u32>;
-// Whether a pixel is not finished.
+// 1: a pixel is not finished; 2: the driver left a loop before its end.
 @group(0) @binding(7) var<storage, read_write> unfinished: array<atomic<u32>>;
 
 const PIXELS: u32 = TILE * TILE;
@@ -104,6 +104,9 @@ fn blend(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     if (!is_inside) {
         return;
     }
+    if (is_cut_short(frame.nothing)) {
+        atomicOr(&unfinished[0], 2u);
+    }
     if (frame.is_last != 0u) {
         let rest = abs(t);
         let alpha = 1.0 - rest;
@@ -117,7 +120,7 @@ fn blend(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
         }
         t = alpha;
     } else if (t > 0.0) {
-        atomicStore(&unfinished[0], 1u);
+        atomicOr(&unfinished[0], 1u);
     }
     let rgb = bitcast<vec3<u32>>(color);
     picture[3u * pixel] = rgb.x;

@@ -18,7 +18,8 @@ struct Chunk {
 @group(0) @binding(5) var<storage, read> shares: array<f32>;
 @group(0) @binding(6) var<storage, read> splats: array<Splat>;
 @group(0) @binding(7) var<storage, read> tints: array<vec4<f32>>;
-// [count][10], then [count]: 1 for a form whose pivot is x, and 2, 4, 8 for channels of colour that are not cut.
+// [count][10], then [count]: 1 for a form whose pivot is x, and 2, 4, 8 for channels of colour that are not cut; last
+// whether the driver left a loop before its end.
 @group(0) @binding(8) var<storage, read_write> sums: array<f32>;
 
 const SUMS: u32 = 10u;
@@ -54,5 +55,8 @@ fn gather(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
             flags += select(0.0, 8.0, color.z > 0.0 && color.z < MAX_COLOR);
             sums[SUMS * chunk.count + at] = flags;
         }
+    }
+    if (is_cut_short(frame.nothing)) {
+        sums[(SUMS + 1u) * chunk.count] = 1.0;
     }
 }

@@ -11,7 +11,7 @@
 // Tile of each pair, in order of depth.
 @group(0) @binding(5) var<storage, read_write> pair_tiles: array<u32>;
 @group(0) @binding(6) var<storage, read_write> pair_splats: array<u32>;
-// The rank that did not fit, or none.
+// The rank that comes after the slice, or none.
 @group(0) @binding(7) var<storage, read_write> slice_end: array<u32>;
 
 struct Ellipse {
@@ -94,7 +94,7 @@ fn cover(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     var pairs = 0u;
-    if (rank >= frame.slice_start && rank < counter[0]) {
+    if (rank >= frame.slice_start && rank < counter[0] && rank - frame.slice_start < frame.slice_splats) {
         let e = ellipse(splats[order[rank]]);
         let r = rows(e);
         for (var row = r.x; row <= r.y; row++) {
@@ -105,37 +105,50 @@ fn cover(@builtin(global_invocation_id) id: vec3<u32>) {
     offsets[rank] = pairs;
 }
 
+// Pairs of one splat that a thread writes: drivers that run on the CPU end loops after 65,535 turns.
+const PART: u32 = 32768u;
+
 @compute @workgroup_size(256)
 fn emit(@builtin(global_invocation_id) id: vec3<u32>) {
     let rank = id.x;
-    if (rank < frame.slice_start || rank >= counter[0]) {
+    if (rank < frame.slice_start || rank >= counter[0] || offsets[rank] > frame.pair_capacity) {
         return;
     }
-    let begin = offsets[rank];
+    if (rank - frame.slice_start >= frame.slice_splats) {
+        if (rank - frame.slice_start == frame.slice_splats && id.y == 0u) {
+            slice_end[0] = rank;
+        }
+        return;
+    }
+    let begin = offsets[rank] + id.y * PART;
     let end = offsets[rank + 1u];
-    if (begin == end || begin > frame.pair_capacity) {
+    if (begin >= end || begin > frame.pair_capacity) {
         return;
     }
+    let stop = min(min(begin + PART, end), frame.pair_capacity);
     var at = begin;
     if (end <= frame.pair_capacity) {
         let splat = order[rank];
         let e = ellipse(splats[splat]);
         let r = rows(e);
-        for (var row = r.x; row <= r.y; row++) {
+        // Those of the parts before.
+        var skip = i32(id.y * PART);
+        for (var row = r.x; row <= r.y && at < stop; row++) {
             let c = columns(e, row);
+            let count = max(c.y - c.x + 1, 0);
             let first = (row - i32(frame.first_tile_row)) * i32(frame.tile_columns) - i32(frame.first_tile_column);
-            for (var column = c.x; column <= c.y && at < end; column++) {
+            for (var column = c.x + min(skip, count); column <= c.y && at < stop; column++) {
                 pair_tiles[at] = u32(first + column);
                 pair_splats[at] = splat;
                 at++;
             }
+            skip = max(skip - count, 0);
         }
     } else {
         slice_end[0] = rank;
     }
     // Nothing is left undefined: not where the slice ends, and not if two kernels should round differently.
-    let last = min(end, frame.pair_capacity);
-    for (; at < last; at++) {
+    for (; at < stop; at++) {
         pair_tiles[at] = NOT_DRAWN;
     }
 }
