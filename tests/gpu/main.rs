@@ -1,15 +1,15 @@
-//! The renderer on a graphics processor: what is its own, beside the pictures and gradients that `render_golden`, `render_numerics`
-//! and `render_gradients` ask of every renderer, and what may go wrong with a device.
+//! The renderer on a graphics processor: what is its own, beside the pictures and gradients that `render_golden`,
+//! `render_numerics` and `render_gradients` ask of every renderer, and what may go wrong with a device.
 
 mod c_abi;
 #[path = "../common/mod.rs"]
 mod common;
 
+use common::compare;
 use common::gpu::renderer;
 use common::gradients::noise;
 use common::scenes::{looking_at_origin, random, surfel_car};
 use common::vehicle::right_side;
-use common::{compare, is_finite};
 use glam::{DMat3, DVec3};
 use std::ops::ControlFlow;
 use std::process::Command;
@@ -20,8 +20,8 @@ use vg::pipeline::{Options, PriorChoice, reconstruct};
 use vg::refine::{Amount, RefineOptions};
 use vg::render::gpu::Bounds;
 use vg::render::{
-    Adapter, AssetRenderer, Backend, Background, CpuRenderer, DepthMode, Differentiable, GpuRenderer,
-    Gradients, Reference, RenderOptions, Rendered, Renderer, Rgba8,
+    Adapter, AssetRenderer, Backend, Background, CpuRenderer, Differentiable, GpuRenderer, Gradients,
+    Reference, RenderOptions, Rendered, Renderer, Rgba8,
 };
 use vg::{Camera, Gaussians, Pose};
 
@@ -275,7 +275,7 @@ fn lists_that_a_driver_does_not_finish_make_slices_and_errors_and_no_wrong_pictu
             assert!((found.background[0] - expected.background[0]).abs() < 1e-4);
         }
         Err(e) => {
-            assert!(gpu.is_software() && e.to_string().contains("leaves loops before their end"), "{e}")
+            assert!(gpu.is_software() && e.to_string().contains("leaves loops before their end"), "{e}");
         }
     }
     // What it finishes it still draws.
