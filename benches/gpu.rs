@@ -6,7 +6,7 @@
 //! cargo bench ... --bench gpu -- 200000            chosen sizes
 //! ```
 //!
-//! Both draw the same picture in turns in one run. `WGPU_ADAPTER_NAME` chooses among several adapters.
+//! `benches/gpu_vs_gsplat` runs it with gsplat's CUDA kernels beside, where there is an NVIDIA GPU. Both draw the same picture in turns in one run. `WGPU_ADAPTER_NAME` chooses among several adapters.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -16,12 +16,13 @@ use common::scenes::{looking_at_origin, surfel_car};
 use common::timing::{median, ms};
 use common::{compare, scenes};
 use glam::DVec3;
+use std::process::Command;
 use std::time::{Duration, Instant};
-use vg::Gaussians;
 use vg::render::{
     Adapter, CpuRenderer, Differentiable, GpuRenderer, Gradients, PictureGradient, Reference, RenderOptions,
     Rendered, Renderer, Rgba8,
 };
+use vg::{Camera, Gaussians};
 
 /// Gaussians of the scene whose error is measured: 4e9 pixel-Gaussian pairs for the reference.
 const ERROR_GAUSSIANS: usize = 20_000;
@@ -33,7 +34,9 @@ const MOST_BOTH_WAYS: usize = 1_000_000;
 const BUDGET: Duration = Duration::from_secs(6);
 
 fn main() {
-    let mut sizes: Vec<usize> = std::env::args().skip(1).filter_map(|a| a.parse().ok()).collect();
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let mut sizes: Vec<usize> = arguments.iter().filter_map(|a| a.parse().ok()).collect();
+    let gsplat = arguments.iter().position(|a| a == "--gsplat").map(|i| arguments[i + 1].clone());
     if sizes.is_empty() {
         sizes = vec![20_000, 200_000, 1_000_000, 4_000_000];
     }
@@ -67,13 +70,16 @@ fn main() {
     for n in sizes {
         let gaussians = surfel_car(n);
         for (width, height) in [(512, 384), (1920, 1080)] {
-            row(&gpu, &cpu, &gaussians, width, height);
+            let cameras = row(&gpu, &cpu, &gaussians, width, height);
+            if let Some(python) = &gsplat {
+                println!("{:>19} {}", "gsplat:", by_gsplat(python, &gaussians, &cameras));
+            }
         }
     }
 }
 
 /// One line: a picture of planes, one of bytes, and a picture with its gradients, by the device and by the CPU in turns.
-fn row(gpu: &GpuRenderer, cpu: &CpuRenderer, gaussians: &Gaussians, width: u32, height: u32) {
+fn row(gpu: &GpuRenderer, cpu: &CpuRenderer, gaussians: &Gaussians, width: u32, height: u32) -> [Camera; 2] {
     // In turns: of a view that was drawn last the device has the order already.
     let cameras = [0.75, -0.75].map(|x| looking_at_origin(width, height, DVec3::new(x, -0.55, 0.36), 8.0));
     let options = RenderOptions::default();
@@ -125,6 +131,29 @@ fn row(gpu: &GpuRenderer, cpu: &CpuRenderer, gaussians: &Gaussians, width: u32, 
         color.mean,
         color.max,
     );
+    cameras
+}
+
+/// What `peers/gsplat.py` prints.
+fn by_gsplat(python: &str, gaussians: &Gaussians, cameras: &[Camera]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("model.ply");
+    vg::io::ply::write(&model, gaussians).unwrap();
+    let i = &cameras[0].intrinsics;
+    let (width, height) = (cameras[0].width.to_string(), cameras[0].height.to_string());
+    let mut command = Command::new(python);
+    command.arg("benches/peers/gsplat.py").arg(&model).args([width, height]);
+    command.arg(format!("{},{},{},{}", i.fx, i.fy, i.cx, i.cy));
+    for camera in cameras {
+        let pose = camera.vehicle_from_camera.inverse();
+        let numbers = glam::DMat4::from_mat3_translation(pose.rotation, pose.translation).transpose();
+        command.arg(numbers.to_cols_array().map(|v| v.to_string()).join(","));
+    }
+    let out = command.output().unwrap_or_else(|e| panic!("{python}: {e}"));
+    match out.status.success() {
+        true => String::from_utf8_lossy(&out.stdout).trim().to_owned(),
+        false => String::from_utf8_lossy(&out.stderr).lines().last().unwrap_or("failed").to_owned(),
+    }
 }
 
 fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
