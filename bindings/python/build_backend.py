@@ -3,7 +3,8 @@
 A wheel holds two faces of one library: the extension module ``_native``, and ``lib/libvg.so`` with ``include/vg.h``
 for ctypes and for C. ``python build_backend.py`` alone prepares a checkout for ``maturin develop``.
 
-``pip install ./bindings/python --config-settings features=onnx`` builds both with networks.
+``pip install ./bindings/python --config-settings features=onnx`` builds both with networks, ``features=gpu`` with
+pictures by graphics processors, ``features=gpu,onnx`` with both.
 
 There is no source distribution: the sources are those of the repository that this folder is a part of.
 """
@@ -24,7 +25,7 @@ ROOT = HERE.parent.parent
 PACKAGE = HERE / "python" / "vehicle_gaussians"
 LICENCES = ("LICENSE-MIT", "LICENSE-APACHE")
 #: What can be built in beside what is always there.
-FEATURES = ("onnx",)
+FEATURES = ("gpu", "onnx")
 
 
 def features_of(config_settings: Any) -> list[str]:

@@ -34,6 +34,16 @@ fn what_cannot_be_refined_is_said() {
     let asset = asset().display();
     fail(at, &format!("refine {asset} . --amount 0s -o {{}}/r.ply"), 2, &["--amount", "above 0"]);
     fail(at, &format!("refine {asset} . -o {asset}"), 1, &["would be replaced"]);
+    fail(
+        at,
+        &format!("refine {asset} . --backend cuda -o {{}}/r.ply"),
+        2,
+        &["--backend", "auto, cpu or gpu"],
+    );
+    if !cfg!(feature = "gpu") {
+        let words = ["options.refine.backend: gpu is not in this build", "feature gpu"];
+        fail(at, &format!("refine {asset} . --views 004 --backend gpu -o {{}}/r.ply"), 1, &words);
+    }
     fail(at, "refine nothing.ply . -o {}/r.ply", 1, &["nothing.ply"]);
     assert_eq!(fs::read_dir(at).unwrap().count(), 0);
 }

@@ -123,13 +123,13 @@ fn the_backend_is_chosen_told_and_an_error_where_it_is_not_there() {
         format!("render {} --cameras . --views 005 --backend {backend} -o {{}}", asset().display())
     };
     let run = succeed(folder.path(), &render("cpu"));
-    assert!(run.out.contains("1 pictures by cpu (") && run.out.contains("): asked for"), "{run:?}");
+    assert!(run.out.contains("1 picture by cpu (") && run.out.contains("): asked for"), "{run:?}");
     let by_cpu = picture(&folder.path().join("005.png"));
     succeed(folder.path(), &render("auto"));
     assert_eq!(vg_in(folder.path(), &render("cuda")).code, 2);
     let run = vg_in(folder.path(), &render("gpu"));
     if run.code == 0 {
-        assert!(run.out.contains("1 pictures by gpu ("), "{run:?}");
+        assert!(run.out.contains("1 picture by gpu ("), "{run:?}");
         let by_gpu = picture(&folder.path().join("005.png"));
         let [a, b] = [&by_cpu, &by_gpu].map(|p| p.as_rgb8().unwrap().as_raw());
         assert!(a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max().unwrap() <= 1);

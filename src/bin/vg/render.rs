@@ -64,7 +64,8 @@ pub(crate) fn run(args: &RenderArgs) -> Result {
     }
     drop(bar);
     let (folder, n) = (args.output.display(), cameras.len());
-    Ok(Outcome::done(format!("{folder}: {n} pictures by {}", ready.choice())))
+    let pictures = if n == 1 { "picture" } else { "pictures" };
+    Ok(Outcome::done(format!("{folder}: {n} {pictures} by {}", ready.choice())))
 }
 
 /// As [`write`], of a picture of 8 bits.
