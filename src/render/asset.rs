@@ -55,8 +55,9 @@ struct OnDevice {
 impl AssetRenderer {
     /// Chooses, and copies the Gaussians to the device where that is the choice.
     ///
-    /// Errors, for [`Backend::Gpu`] alone: [`Error::NotBuilt`] in a build without the feature `gpu`,
-    /// [`Error::Missing`] without a driver, [`Error::Argument`] for more Gaussians than the device can take.
+    /// Errors, for [`Backend::Gpu`] alone: [`NotBuilt`](crate::Error::NotBuilt) in a build without the feature `gpu`,
+    /// [`Missing`](crate::Error::Missing) without a driver, [`Argument`](crate::Error::Argument) for more Gaussians than
+    /// the device can take.
     pub fn new(gaussians: Arc<Gaussians>, backend: Backend) -> Result<Self> {
         let cpu = CpuRenderer::new();
         let on_cpu =
@@ -97,8 +98,8 @@ impl AssetRenderer {
 
     /// As [`AssetRenderer::render`], into a picture whose memory is reused.
     ///
-    /// Errors of the device ([`Error::Missing`]) end the call, or under [`Backend::Auto`] the device's part: the CPU
-    /// draws this picture and those that follow.
+    /// Errors of the device ([`Missing`](crate::Error::Missing)) end the call, or under [`Backend::Auto`] the device's
+    /// part: the CPU draws this picture and those that follow.
     pub fn render_into(&self, camera: &Camera, options: &RenderOptions, target: &mut Rendered) -> Result<()> {
         #[cfg(feature = "gpu")]
         if let Some(device) = self.device() {

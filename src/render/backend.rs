@@ -56,7 +56,7 @@ pub type Trainer = Arc<dyn Differentiable + Send + Sync>;
 /// Who draws Gaussians that are others in each picture, and goes back: for optimisation. [`Backend::Auto`] is the CPU,
 /// as the way back ends there and the Gaussians would have to be copied to the device for each picture.
 ///
-/// Errors, for [`Backend::Gpu`] alone: those of [`AssetRenderer::new`].
+/// Errors, for [`Backend::Gpu`] alone: those of [`AssetRenderer::new`](super::AssetRenderer::new).
 pub fn trainer(backend: Backend) -> Result<(Trainer, Choice)> {
     match backend {
         Backend::Gpu => device_trainer(),

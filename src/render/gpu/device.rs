@@ -58,7 +58,9 @@ impl Device {
         adapters.sort_by_key(|a| rank(a.get_info().device_type));
         let Some(adapter) = adapters.first() else { return Err(none(wanted, &names, chosen.as_deref())) };
         let info = adapter.get_info();
-        let limits = adapter.limits();
+        let mut limits = adapter.limits();
+        // No kernel asks for more than every device has.
+        limits.max_storage_buffers_per_shader_stage = limits.max_storage_buffers_per_shader_stage.min(8);
         let opened = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("vg"),
             required_features: wgpu::Features::empty(),

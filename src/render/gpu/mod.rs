@@ -1,5 +1,5 @@
-//! The renderer on a graphics processor: the picture of [`CpuRenderer`](crate::render::CpuRenderer), drawn by WGSL
-//! kernels through wgpu and Vulkan, without a window.
+//! The renderer on a graphics processor: the picture of [`CpuRenderer`], drawn by WGSL kernels through wgpu and Vulkan,
+//! without a window.
 //!
 //! `draw` has the stages of a picture in their order: `project` (one Gaussian a thread), sort by depth, list (tile,
 //! splat) pairs, sort by tile, `blend` (one pixel a thread); `gradients` those of the way back. Nothing depends on the

@@ -22,8 +22,9 @@
 // [held_pairs][10]: w, w t, w s, w t t, w t s, w s s, red, green, blue, depth; (t, s) is the offset whitened, with
 // q = t^2 + s^2.
 @group(0) @binding(7) var<storage, read_write> shares: array<f32>;
-// Of the window's tiles: the gradient of the background's colour, and whether the driver left a loop before its end.
-@group(0) @binding(8) var<storage, read_write> backgrounds: array<vec4<f32>>;
+// [tiles of the window][4]: the gradient of the background's colour, and whether the driver left a loop before its end.
+// Not vectors: threads may not write to one vector's components at once.
+@group(0) @binding(8) var<storage, read_write> backgrounds: array<f32>;
 
 const PIXELS: u32 = TILE * TILE;
 // Layers of one turn.
@@ -61,7 +62,8 @@ fn back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let x = u32(center.x);
     let y = u32(center.y);
     let is_inside = x < frame.width && y < frame.height;
-    let range = ranges[group.y * frame.tile_columns + group.x];
+    let tile = group.y * frame.tile_columns + group.x;
+    let range = ranges[tile];
 
     // Forward, as `blend`.
     var t = select(-1.0, 1.0, is_inside);
@@ -132,15 +134,16 @@ fn back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     workgroupBarrier();
     atomicMax(&live, end);
     if (lane == 3u) {
-        backgrounds[group.y * frame.tile_columns + group.x].w = 0.0;
+        backgrounds[4u * tile + 3u] = 0.0;
     }
     if (lane < 3u) {
         var sum = 0.0;
         for (var p = 0u; p < PIXELS; p++) {
             sum += upstream[p][lane];
         }
-        backgrounds[group.y * frame.tile_columns + group.x][lane] = sum;
+        backgrounds[4u * tile + lane] = sum;
     }
+    storageBarrier();
     workgroupBarrier();
     upstream[lane] = toward;
     if (lane == 0u) {
@@ -240,6 +243,6 @@ fn back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         workgroupBarrier();
     }
     if (is_cut_short(frame.nothing)) {
-        backgrounds[group.y * frame.tile_columns + group.x].w = 1.0;
+        backgrounds[4u * tile + 3u] = 1.0;
     }
 }
