@@ -1193,7 +1193,7 @@ typedef struct vg_render_options {
     struct vg_context *context;
     /**
      * A `vg_backend`. Default `VG_BACKEND_AUTO`. Where pictures follow each other a `vg_renderer` is faster: a graphics
-     * processor is sent the Gaussians once. `vg_render_backward` draws on the CPU alone.
+     * processor is sent the Gaussians once, and here with each call.
      */
     int32_t backend;
     /**

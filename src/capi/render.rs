@@ -67,7 +67,7 @@ pub struct vg_render_options {
     /// each other.
     pub context: *mut vg_context,
     /// A `vg_backend`. Default `VG_BACKEND_AUTO`. Where pictures follow each other a `vg_renderer` is faster: a graphics
-    /// processor is sent the Gaussians once. `vg_render_backward` draws on the CPU alone.
+    /// processor is sent the Gaussians once, and here with each call.
     pub backend: i32,
     /// A `vg_background`. Default `VG_BACKGROUND_COLOR`.
     pub background: i32,
