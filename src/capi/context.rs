@@ -5,7 +5,7 @@ use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
 use crate::error::Result;
 use crate::progress::Threads;
-use crate::render::{CpuRenderer, Rendered};
+use crate::render::{CpuRenderer, Rendered, Rgba8};
 use std::sync::{Mutex, PoisonError};
 
 /// Worker threads and scratch memory, made once and named in the options of calls, so that a call neither starts
@@ -42,22 +42,33 @@ unsafe impl Versioned for vg_context_options {
 pub(super) struct Workshop {
     pub(super) threads: Threads,
     pub(super) renderer: CpuRenderer,
-    pictures: Mutex<Vec<Rendered>>,
+    pub(super) pictures: Spare<Rendered>,
+    pub(super) bytes: Spare<Rgba8>,
 }
+
+/// Memory that is kept from call to call, as often as there were calls at a time.
+#[derive(Default)]
+pub(super) struct Spare<T>(Mutex<Vec<T>>);
 
 impl Workshop {
     pub(super) fn new(threads: usize) -> Result<Self> {
-        let (renderer, pictures) = (CpuRenderer::new(), Mutex::default());
-        Ok(Self { threads: Threads::new(threads)?, renderer, pictures })
+        let threads = Threads::new(threads)?;
+        Ok(Self {
+            threads,
+            renderer: CpuRenderer::new(),
+            pictures: Spare::default(),
+            bytes: Spare::default(),
+        })
     }
+}
 
-    /// Runs `work` with a picture whose memory is kept for the next time.
-    pub(super) fn with_picture<T>(&self, work: impl FnOnce(&mut Rendered) -> T) -> T {
-        // A panic elsewhere cannot leave a list of spare pictures in a state that matters.
-        let mut picture =
-            self.pictures.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
-        let result = work(&mut picture);
-        self.pictures.lock().unwrap_or_else(PoisonError::into_inner).push(picture);
+impl<T: Default> Spare<T> {
+    /// Runs `work` with memory that is kept for the next time.
+    pub(super) fn lend<R>(&self, work: impl FnOnce(&mut T) -> R) -> R {
+        // A panic elsewhere cannot leave a list of spare memory in a state that matters.
+        let mut memory = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
+        let result = work(&mut memory);
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(memory);
         result
     }
 }

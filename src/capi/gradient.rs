@@ -213,7 +213,7 @@ pub unsafe extern "C" fn vg_render_backward(
                     out.write(&shop.threads.run(back)?);
                     return Ok(());
                 };
-                shop.with_picture(|picture| {
+                shop.pictures.lend(|picture| {
                     let mut gradients = Gradients::default();
                     let lent = Lent(&target, &planes);
                     let draw = |ask: &dyn Fn(()) -> i32| {

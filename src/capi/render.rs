@@ -207,7 +207,7 @@ pub unsafe extern "C" fn vg_render(
             let target = read::required("target", target)?;
             let target = Target::read("target", &target, &settings, alpha, camera.width, camera.height)?;
             in_context(options.context, |shop| {
-                shop.with_picture(|picture| {
+                shop.pictures.lend(|picture| {
                     match device(&options)? {
                         Some(device) => *picture = device.render(gaussians, &camera, &settings)?,
                         None => shop.threads.run(|| {
@@ -285,6 +285,10 @@ pub(super) struct Target {
     depth: Option<(*mut u8, usize)>,
     alpha: Option<(*mut u8, usize)>,
 }
+
+// The caller vouches for the memory until the call ends, and one thread at a time writes there.
+unsafe impl Send for Target {}
+unsafe impl Sync for Target {}
 
 /// How a pixel is written.
 #[derive(Clone, Copy)]

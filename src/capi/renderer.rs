@@ -133,27 +133,31 @@ pub unsafe extern "C" fn vg_renderer_render(
             let (settings, alpha) = options.read()?;
             let cameras = read::array("cameras", cameras, count)?;
             let targets = read::array("targets", targets, count)?;
-            let mut pictures = Vec::with_capacity(count);
+            let (mut seen, mut places) = (Vec::with_capacity(count), Vec::with_capacity(count));
             for (i, (camera, target)) in cameras.iter().zip(&targets).enumerate() {
                 let camera = camera::camera(&format!("cameras[{i}]"), camera)?;
                 let (width, height) = (camera.width, camera.height);
                 let name = format!("targets[{i}]");
-                pictures.push((camera, Target::read(&name, target, &settings, alpha, width, height)?));
+                places.push(Target::read(&name, target, &settings, alpha, width, height)?);
+                seen.push(camera);
             }
+            let ready = &object.ready;
+            // Of the CPU's planes the bytes are made on the way to the target.
+            let as_bytes = ready.choice().backend == Backend::Gpu && places.iter().all(Target::takes_bytes);
             in_context(options.context, |shop| {
-                let mut bytes = Rgba8::default();
-                shop.with_picture(|picture| {
-                    for (camera, target) in &pictures {
-                        // Of the CPU's planes the bytes are made on the way to the target.
-                        if target.takes_bytes() && object.ready.choice().backend == Backend::Gpu {
-                            shop.threads.run(|| object.ready.render_rgba8(camera, &settings, &mut bytes))?;
-                            target.write_bytes(&bytes.pixels, camera.width);
-                            continue;
-                        }
-                        shop.threads.run(|| object.ready.render_into(camera, &settings, picture))?;
-                        target.write(picture);
-                    }
-                    Ok(())
+                shop.threads.run(|| match as_bytes {
+                    true => shop.bytes.lend(|bytes| {
+                        ready.render_each(&seen, &settings, bytes, |i, rgba: &Rgba8| {
+                            places[i].write_bytes(&rgba.pixels, seen[i].width);
+                            Ok(())
+                        })
+                    }),
+                    false => shop.pictures.lend(|picture| {
+                        ready.render_each(&seen, &settings, picture, |i, planes| {
+                            places[i].write(planes);
+                            Ok(())
+                        })
+                    }),
                 })
             })
         })

@@ -3,7 +3,7 @@
 #[cfg(not(feature = "gpu"))]
 use super::backend::not_built;
 use super::backend::{Backend, Choice, is_built};
-use super::{CpuRenderer, RenderOptions, Rendered, Rgba8};
+use super::{CpuRenderer, Picture, RenderOptions, Rendered};
 #[cfg(feature = "gpu")]
 use crate::error::Error;
 use crate::error::Result;
@@ -96,33 +96,58 @@ impl AssetRenderer {
         Ok(target)
     }
 
-    /// As [`AssetRenderer::render`], into a picture whose memory is reused.
+    /// As [`AssetRenderer::render`], into a picture whose memory is reused: planes, or 8 bits, which are less to fetch from
+    /// a device.
     ///
     /// Errors of the device ([`Missing`](crate::Error::Missing)) end the call, or under [`Backend::Auto`] the device's
     /// part: the CPU draws this picture and those that follow.
-    pub fn render_into(&self, camera: &Camera, options: &RenderOptions, target: &mut Rendered) -> Result<()> {
+    pub fn render_into<P: Picture>(
+        &self,
+        camera: &Camera,
+        options: &RenderOptions,
+        target: &mut P,
+    ) -> Result<()> {
         #[cfg(feature = "gpu")]
         if let Some(device) = self.device() {
-            match device.renderer.render_asset_into(&device.asset, camera, options, target) {
+            match target.draw_on(&device.renderer, &device.asset, camera, options) {
                 Err(e @ Error::Missing { .. }) if self.may_fall_back => self.fall_back(&e),
                 done => return done,
             }
         }
-        self.cpu.render_into(&self.gaussians, camera, options, target)?;
-        Ok(())
+        target.draw(&self.cpu, &self.gaussians, camera, options)
     }
 
-    /// As [`AssetRenderer::render_into`], into a picture of 8 bits: less to fetch from a device.
-    pub fn render_rgba8(&self, camera: &Camera, options: &RenderOptions, target: &mut Rgba8) -> Result<()> {
+    /// A picture for each camera, made in the memory of `picture` and handed to `take` in their order with the camera's
+    /// number. While `take` has one, a device draws the next.
+    ///
+    /// Errors: those of `take`, and of [`AssetRenderer::render_into`] for the camera that comes first.
+    pub fn render_each<P: Picture>(
+        &self,
+        cameras: &[Camera],
+        options: &RenderOptions,
+        picture: &mut P,
+        mut take: impl FnMut(usize, &P) -> Result<()>,
+    ) -> Result<()> {
+        #[cfg_attr(not(feature = "gpu"), expect(unused_mut))]
+        let mut done = 0;
         #[cfg(feature = "gpu")]
         if let Some(device) = self.device() {
-            match device.renderer.render_asset_rgba8(&device.asset, camera, options, target) {
-                Err(e @ Error::Missing { .. }) if self.may_fall_back => self.fall_back(&e),
-                done => return done,
+            let mut was_taken = true;
+            let counted = |i: usize, picture: &P| {
+                let taken = take(i, picture);
+                (was_taken, done) = (taken.is_ok(), i + 1);
+                taken
+            };
+            match device.renderer.render_each(&device.asset, cameras, options, picture, counted) {
+                Err(e @ Error::Missing { .. }) if self.may_fall_back && was_taken => self.fall_back(&e),
+                all => return all,
             }
         }
-        target
-            .make(options, |planes| self.cpu.render_into(&self.gaussians, camera, options, planes).map(drop))
+        for (i, camera) in cameras.iter().enumerate().skip(done) {
+            picture.draw(&self.cpu, &self.gaussians, camera, options)?;
+            take(i, picture)?;
+        }
+        Ok(())
     }
 
     #[cfg(feature = "gpu")]

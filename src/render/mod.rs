@@ -10,6 +10,7 @@ pub mod gradient;
 pub mod loss;
 pub mod options;
 pub mod output;
+mod picture;
 pub mod reference;
 mod view;
 
@@ -21,6 +22,7 @@ pub use gpu::{Adapter, GpuAsset, GpuRenderer};
 pub use gradient::{Differentiable, Gradients, PictureGradient, PoseGradient};
 pub use options::{Background, DepthMode, RenderOptions};
 pub use output::{Rendered, Rgba8};
+pub use picture::Picture;
 pub use reference::{Reference, ReferenceGradients};
 
 use crate::error::Result;

@@ -1,6 +1,7 @@
 //! The renderer on a graphics processor: what is its own, beside the pictures and gradients that `render_golden`,
 //! `render_numerics` and `render_gradients` ask of every renderer, and what may go wrong with a device.
 
+mod batch;
 mod c_abi;
 #[path = "../common/mod.rs"]
 mod common;

@@ -55,22 +55,69 @@ impl Renderer {
         far: f32,
         sh_degree: u8,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let background = background.map_or(Ok(Background::Color([1.0; 3])), parse_background)?;
-        let options =
-            RenderOptions { background, antialiased, near, far, sh_degree, ..RenderOptions::default() };
+        let options = options(background, antialiased, [near, far], sh_degree)?;
         let camera = &camera.get().inner;
         let mut drawn = Rgba8::default();
-        pooled(py, threads, || self.ready.render_rgba8(camera, &options, &mut drawn))?;
-        let size = (camera.height as usize, camera.width as usize);
-        let rgb = |&[r, g, b, _]: &[u8; 4]| [r, g, b];
-        Ok(match background {
-            Background::Color(_) => picture(py, size, drawn.pixels.iter().map(rgb).collect()),
-            Background::Transparent => picture(py, size, drawn.pixels),
-        })
+        pooled(py, threads, || self.ready.render_into(camera, &options, &mut drawn))?;
+        Ok(array(py, camera, &options, drawn.pixels))
+    }
+
+    /// The pictures of several cameras, a list of what render gives. A graphics processor draws one while the picture
+    /// before it is copied.
+    #[pyo3(signature = (
+        cameras, background=None, threads=0, *, antialiased=false, near=0.01, far=1e10, sh_degree=3
+    ), text_signature = "(self, cameras, background='white', threads=0, *, antialiased=False, near=0.01, far=1e10, \
+        sh_degree=3)")]
+    fn render_many<'py>(
+        &self,
+        py: Python<'py>,
+        cameras: Vec<Bound<'py, Camera>>,
+        background: Option<&Bound<'py, PyAny>>,
+        threads: usize,
+        antialiased: bool,
+        near: f32,
+        far: f32,
+        sh_degree: u8,
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let options = options(background, antialiased, [near, far], sh_degree)?;
+        let cameras: Vec<_> = cameras.iter().map(|camera| camera.get().inner.clone()).collect();
+        let mut drawn = Vec::with_capacity(cameras.len());
+        pooled(py, threads, || {
+            self.ready.render_each(&cameras, &options, &mut Rgba8::default(), |_, picture| {
+                drawn.push(picture.pixels.clone());
+                Ok(())
+            })
+        })?;
+        Ok(cameras.iter().zip(drawn).map(|(camera, pixels)| array(py, camera, &options, pixels)).collect())
     }
 
     fn __repr__(&self) -> String {
         format!("Renderer({})", self.ready.choice())
+    }
+}
+
+fn options(
+    background: Option<&Bound<'_, PyAny>>,
+    antialiased: bool,
+    [near, far]: [f32; 2],
+    sh_degree: u8,
+) -> PyResult<RenderOptions> {
+    let background = background.map_or(Ok(Background::Color([1.0; 3])), parse_background)?;
+    Ok(RenderOptions { background, antialiased, near, far, sh_degree, ..RenderOptions::default() })
+}
+
+/// uint8 (height, width, 3), or 4 on a transparent background.
+fn array<'py>(
+    py: Python<'py>,
+    camera: &vg::Camera,
+    options: &RenderOptions,
+    pixels: Vec<[u8; 4]>,
+) -> Bound<'py, PyAny> {
+    let size = (camera.height as usize, camera.width as usize);
+    let rgb = |&[r, g, b, _]: &[u8; 4]| [r, g, b];
+    match options.background {
+        Background::Color(_) => picture(py, size, pixels.iter().map(rgb).collect()),
+        Background::Transparent => picture(py, size, pixels),
     }
 }
 

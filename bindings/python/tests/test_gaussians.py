@@ -232,6 +232,10 @@ def test_a_renderer_draws_the_same_and_says_who_did(made: vg.Reconstruction, ell
     for background in ("white", "transparent"):
         expected = made.gaussians.render(camera, background)
         np.testing.assert_array_equal(ready.render(camera, background), expected)
+    several = ready.render_many(ellipsoid.cameras, threads=1)
+    assert len(several) == len(ellipsoid.cameras) > 1 and ready.render_many([]) == []
+    for camera, picture in zip(ellipsoid.cameras, several, strict=True):
+        np.testing.assert_array_equal(picture, made.gaussians.render(camera))
     assert vg.Renderer(made.gaussians).backend in ("cpu", "gpu")
     with pytest.raises(vg.VgError, match='backend: "cuda"; allowed: auto, cpu, gpu'):
         vg.Renderer(made.gaussians, "cuda")  # type: ignore[arg-type]

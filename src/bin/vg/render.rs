@@ -5,6 +5,7 @@ use crate::job::{self, Failure, Outcome, Result};
 use crate::shown::Bar;
 use crate::{files, scene};
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use vg::geometry::Intrinsics;
@@ -46,21 +47,37 @@ pub(crate) fn run(args: &RenderArgs) -> Result {
     let threads = Threads::new(args.threads)?;
     let ready = AssetRenderer::new(Arc::new(gaussians), args.backend)?;
     let bar = Bar::of_pictures(cameras.len());
-    let mut bytes = Rgba8::default();
-    for (i, named) in cameras.iter().enumerate() {
-        if !args.depth {
-            threads.run(|| ready.render_rgba8(&named.camera, &options, &mut bytes))?;
-            write_bytes(&pictures[i], [named.camera.width, named.camera.height], &bytes.pixels, &options)?;
-        } else {
-            let drawn = threads.run(|| ready.render(&named.camera, &options))?;
-            write(&pictures[i], &drawn, options.background)?;
+    let seen: Vec<Camera> = cameras.iter().map(|named| named.camera).collect();
+    if args.depth {
+        let each = |i: usize, drawn: &Rendered| {
+            write(&pictures[i], drawn, options.background)?;
             let beyond = image::write_depth16(&depths[i], drawn.width, drawn.height, &drawn.depth)?;
             if beyond > 0 {
                 let path = depths[i].display();
                 job::note(&format!("{path}: {beyond} pixels lie beyond 65.535 m and hold none"));
             }
-        }
-        bar.advance();
+            bar.advance();
+            Ok(())
+        };
+        threads.run(|| ready.render_each(&seen, &options, &mut Rendered::default(), each))?;
+    } else {
+        // Encoding takes longer than drawing: as many at a time as there are threads.
+        let mut waiting = Vec::new();
+        let each = |i: usize, drawn: &Rgba8| {
+            waiting.push((i, drawn.pixels.clone()));
+            if i + 1 < seen.len() && waiting.len() < rayon::current_num_threads() {
+                return Ok(());
+            }
+            let write = |(i, pixels): (usize, Vec<_>)| {
+                write_bytes(&pictures[i], &seen[i], &pixels, options.background)?;
+                bar.advance();
+                Ok(())
+            };
+            // The first picture's error, whichever came first.
+            let written: Vec<vg::Result<()>> = waiting.par_drain(..).map(write).collect();
+            written.into_iter().collect()
+        };
+        threads.run(|| ready.render_each(&seen, &options, &mut Rgba8::default(), each))?;
     }
     drop(bar);
     let (folder, n) = (args.output.display(), cameras.len());
@@ -69,29 +86,22 @@ pub(crate) fn run(args: &RenderArgs) -> Result {
 }
 
 /// As [`write`], of a picture of 8 bits.
-fn write_bytes(
-    path: &Path,
-    [width, height]: [u32; 2],
-    rgba: &[[u8; 4]],
-    options: &RenderOptions,
-) -> Result<()> {
-    match options.background {
+fn write_bytes(path: &Path, camera: &Camera, rgba: &[[u8; 4]], background: Background) -> vg::Result<()> {
+    match background {
         Background::Color(_) => {
             let rgb: Vec<[u8; 3]> = rgba.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
-            image::write_rgb8(path, width, height, &rgb)?;
+            image::write_rgb8(path, camera.width, camera.height, &rgb)
         }
-        Background::Transparent => image::write_rgba8(path, width, height, rgba)?,
+        Background::Transparent => image::write_rgba8(path, camera.width, camera.height, rgba),
     }
-    Ok(())
 }
 
 /// An opaque picture, or one with its own alpha on a transparent background.
-pub(crate) fn write(path: &Path, drawn: &Rendered, background: Background) -> Result<()> {
+pub(crate) fn write(path: &Path, drawn: &Rendered, background: Background) -> vg::Result<()> {
     match background {
-        Background::Color(_) => image::write_rgb8(path, drawn.width, drawn.height, &drawn.to_rgb8())?,
-        Background::Transparent => image::write_rgba8(path, drawn.width, drawn.height, &drawn.to_rgba8())?,
+        Background::Color(_) => image::write_rgb8(path, drawn.width, drawn.height, &drawn.to_rgb8()),
+        Background::Transparent => image::write_rgba8(path, drawn.width, drawn.height, &drawn.to_rgba8()),
     }
-    Ok(())
 }
 
 /// `<image stem>.png`, without the folders of the picture's name.

@@ -140,9 +140,10 @@ impl Device {
         locked(&self.trouble).lost.get_or_insert_with(|| "destroyed".into());
     }
 
-    /// Hands each of `buffers`, of which the first so many bytes are wanted, to `take` when everything submitted is done.
+    /// Hands each of `buffers`, of which the first so many bytes are wanted, to `take` when what was submitted is done.
     pub(super) fn read(
         &self,
+        submitted: wgpu::SubmissionIndex,
         buffers: &[(&wgpu::Buffer, u64)],
         mut take: impl FnMut(usize, &[u8]),
     ) -> Result<()> {
@@ -150,7 +151,8 @@ impl Device {
             // An error is one of the device's too; it is looked for below.
             buffer.map_async(wgpu::MapMode::Read, 0..*bytes, |_| {});
         }
-        let waited = self.device.poll(wgpu::PollType::wait_indefinitely());
+        let wait = wgpu::PollType::Wait { submission_index: Some(submitted), timeout: None };
+        let waited = self.device.poll(wait);
         self.check()?;
         if let Err(e) = waited {
             return Err(Error::Missing {

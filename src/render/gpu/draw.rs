@@ -3,7 +3,7 @@
 
 use super::asset::GpuAsset;
 use super::frame::{Frame, TILE};
-use super::memory::{Memory, PIXEL};
+use super::memory::{Made, Memory, NUMBERS, PIXEL, Readback};
 use super::stages::{Stages, bits_of};
 use super::{GpuRenderer, MOST_TILES};
 use crate::error::Result;
@@ -13,8 +13,17 @@ use crate::render::{RenderOptions, Rendered};
 /// Splats of a slice where the driver leaves loops before their end.
 const FEW: u32 = 1 << 15;
 
+/// What a picture is wanted as.
+#[derive(Clone, Copy)]
+pub(super) enum Pixels {
+    Planes,
+    Bytes,
+}
+
 /// Where a picture goes.
-pub(super) enum Target<'a> {
+#[derive(Debug)]
+pub enum Target<'a> {
+    /// Colour, alpha and depth.
     Planes(&'a mut Rendered),
     /// RGBA, 8 bits each.
     Bytes(&'a mut Vec<[u8; 4]>),
@@ -89,7 +98,7 @@ impl GpuRenderer {
         // A splat has at most one pair per tile: a slice holds one at least.
         let most_pairs = self.bounds.pairs.max(tiles(camera, rows.count));
         let mut wanted = first_guess(asset, most_pairs);
-        let last = target.last();
+        let last = target.pixels().last();
         (frame.slice_start, frame.is_first, frame.is_last) = (0, 1, last);
         frame.slice_splats = u32::MAX;
         loop {
@@ -126,7 +135,6 @@ impl GpuRenderer {
         }
     }
 
-    /// The stages, in their order.
     fn draw_slice(
         &self,
         asset: &GpuAsset,
@@ -136,6 +144,24 @@ impl GpuRenderer {
         memory: &mut Memory,
         target: &mut Target,
     ) -> Result<Slice> {
+        let flight = self.submit_slice(asset, camera, frame, depth_bits, memory, target.pixels());
+        self.finish_slice(flight, memory, target)
+    }
+
+    /// The stages, in their order.
+    pub(super) fn submit_slice(
+        &self,
+        asset: &GpuAsset,
+        camera: &Camera,
+        frame: &mut Frame,
+        depth_bits: u32,
+        memory: &mut Memory,
+        wanted_as: Pixels,
+    ) -> Flight {
+        let rows = Rows { first: frame.first_tile_row, count: frame.tile_rows };
+        let wanted = (frame.is_last != 0).then(|| wanted_as.part(pixels(camera, rows)));
+        let bytes = wanted.map_or(0, |[_, bytes]| bytes);
+        let readback = memory.readback(&self.device, bytes);
         let Memory { counters, gaussian: Some(per), pair: Some(pair), band: Some(band), .. } = &*memory
         else {
             unreachable!("made before any slice");
@@ -146,11 +172,8 @@ impl GpuRenderer {
         queue.write_buffer(&counters.slice_end, 0, bytemuck::bytes_of(&u32::MAX));
         queue.write_buffer(&counters.unfinished, 0, bytemuck::bytes_of(&0u32));
 
-        let rows = Rows { first: frame.first_tile_row, count: frame.tile_rows };
         let tiles = tiles(camera, rows.count);
         let tile_bits = bits_of(tiles as u32);
-        let pixels = pixels(camera, rows);
-        let wanted = (frame.is_last != 0).then(|| target.part(pixels));
         let mut stages = Stages::new(&self.device, &self.kernels);
         let splats_of = (asset.id, frame.of_splats());
         if memory.splats_of != Some(splats_of) {
@@ -160,22 +183,40 @@ impl GpuRenderer {
         stages.list_pairs(counters, per, pair, depth_bits, tiles);
         stages.sort_by_tile(per, pair, band, tile_bits);
         stages.blend(frame, counters, per, pair, band, tile_bits);
-        stages.read_back(counters, per, band, wanted);
-        stages.submit();
+        stages.read_back(counters, per, band, &readback, wanted);
+        let submission = stages.submit();
+        (memory.splats_of, memory.pairs_of) = (Some(splats_of), None);
+        memory.listings += 1;
+        Flight {
+            readback,
+            submission,
+            bytes,
+            first_pixel: (rows.first * TILE) as usize * camera.width as usize,
+            listing: memory.listings,
+            lists_of: (frame.slice_start == 0).then(|| (asset.id, frame.of_lists())),
+        }
+    }
 
+    /// Waits for a slice; its pixels, if it was the last, are in the target then.
+    pub(super) fn finish_slice(
+        &self,
+        flight: Flight,
+        memory: &mut Memory,
+        target: &mut Target,
+    ) -> Result<Slice> {
         let mut numbers = [0u32; 3];
-        let first = (rows.first * TILE) as usize * camera.width as usize;
         let take = |i: usize, bytes: &[u8]| match i {
             0 => bytemuck::bytes_of_mut(&mut numbers).copy_from_slice(bytes),
-            _ => target.write(first, bytes),
+            _ => target.write(flight.first_pixel, bytes),
         };
-        let [_, bytes] = wanted.unwrap_or_default();
-        let buffers = [(&counters.readback, 12), (&band.readback, bytes)];
-        self.device.read(&buffers[..if wanted.is_some() { 2 } else { 1 }], take)?;
+        let buffers = [(&flight.readback.numbers, NUMBERS), (&flight.readback.picture, flight.bytes)];
+        self.device.read(flight.submission, &buffers[..if flight.bytes > 0 { 2 } else { 1 }], take)?;
+        memory.give_back(flight.readback);
         let [pairs, end, unfinished] = numbers;
-        memory.splats_of = Some(splats_of);
-        let is_whole = frame.slice_start == 0 && end == u32::MAX;
-        memory.pairs_of = is_whole.then_some(((asset.id, frame.of_lists()), pairs));
+        // Unless others were listed since.
+        if memory.listings == flight.listing && end == u32::MAX {
+            memory.pairs_of = flight.lists_of.map(|of| (of, pairs));
+        }
         Ok(Slice { pairs, end, is_unfinished: unfinished & 1 != 0, is_cut_short: unfinished & 2 != 0 })
     }
 
@@ -196,14 +237,33 @@ pub(super) struct Rows {
     pub(super) count: u32,
 }
 
+/// A slice that the device is at.
+pub(super) struct Flight {
+    readback: Readback,
+    submission: wgpu::SubmissionIndex,
+    /// Of the picture, that come back.
+    bytes: u64,
+    first_pixel: usize,
+    /// Which of `Memory::listings` it is, and whose lists they are if it begins with the first splat.
+    listing: u64,
+    lists_of: Option<Made>,
+}
+
 /// How a slice went.
-struct Slice {
+pub(super) struct Slice {
     /// Those of all its splats, whether they fitted or not.
-    pairs: u32,
+    pub(super) pairs: u32,
     /// Rank of the first splat that is not in it, or `u32::MAX`.
     end: u32,
     is_unfinished: bool,
-    is_cut_short: bool,
+    pub(super) is_cut_short: bool,
+}
+
+impl Slice {
+    /// Whether it was all there is to draw.
+    pub(super) fn is_whole(&self) -> bool {
+        self.end == u32::MAX && !self.is_cut_short
+    }
 }
 
 /// Room for pairs to begin with: one for each Gaussian, within bounds.
@@ -221,25 +281,34 @@ pub(super) fn pixels(camera: &Camera, rows: Rows) -> u64 {
     u64::from(camera.width) * u64::from(last - rows.first * TILE)
 }
 
-impl Target<'_> {
+impl Pixels {
     /// What `Frame::is_last` is of its last slice.
-    fn last(&self) -> u32 {
+    pub(super) fn last(self) -> u32 {
         match self {
-            Self::Planes(_) => 1,
-            Self::Bytes(_) => 2,
+            Self::Planes => 1,
+            Self::Bytes => 2,
         }
     }
 
     /// Which bytes of a band's picture are wanted: from where, and how many.
-    fn part(&self, pixels: u64) -> [u64; 2] {
+    fn part(self, pixels: u64) -> [u64; 2] {
         match self {
-            Self::Planes(_) => [0, PIXEL * pixels],
+            Self::Planes => [0, PIXEL * pixels],
             // The plane of depth.
-            Self::Bytes(_) => [16 * pixels, 4 * pixels],
+            Self::Bytes => [16 * pixels, 4 * pixels],
+        }
+    }
+}
+
+impl Target<'_> {
+    pub(super) fn pixels(&self) -> Pixels {
+        match self {
+            Self::Planes(_) => Pixels::Planes,
+            Self::Bytes(_) => Pixels::Bytes,
         }
     }
 
-    fn resize(&mut self, camera: &Camera) {
+    pub(super) fn resize(&mut self, camera: &Camera) {
         let pixels = camera.width as usize * camera.height as usize;
         match self {
             Self::Planes(picture) => {

@@ -7,7 +7,7 @@
 use super::asset::GpuAsset;
 use super::draw::{Rows, Target, first_guess, pixels, tiles};
 use super::frame::{Frame, TILE};
-use super::memory::{BACKGROUND, Memory, PIXEL, SHARE, SUMS};
+use super::memory::{BACKGROUND, Memory, NUMBERS, PIXEL, SHARE, SUMS};
 use super::stages::{Stages, bits_of};
 use super::{GpuRenderer, MOST_THREADS};
 use crate::error::Result;
@@ -177,6 +177,8 @@ impl GpuRenderer {
             let capacity = memory.pair.as_ref().map_or(0, |p| p.tiles.capacity);
             let most_shares = capacity.min(self.bounds.shares);
             memory.for_shares(&self.device, most_shares, self.bounds.binding);
+            memory.listings += 1;
+            let readback = memory.readback(&self.device, 0);
             let Memory {
                 counters,
                 gaussian: Some(per),
@@ -205,9 +207,9 @@ impl GpuRenderer {
                 stages.sort_by_tile(per, pair, band, tile_bits);
             }
             stages.back(frame, counters, per, pair, band, back, [depth_bits, tile_bits]);
-            stages.read_back(counters, per, band, None);
+            stages.read_back(counters, per, band, &readback, None);
             stages.read_backgrounds(back, window.tiles());
-            stages.submit();
+            let submission = stages.submit();
             let mut numbers = [0u32; 3];
             let mut background = [0.0; 4];
             let take = |i: usize, bytes: &[u8]| match i {
@@ -215,9 +217,10 @@ impl GpuRenderer {
                 _ => background = sum(bytes),
             };
             let backgrounds = (&back.backgrounds_readback, BACKGROUND * window.tiles());
-            self.device.read(&[(&counters.readback, 12), backgrounds], take)?;
+            self.device.read(submission, &[(&readback.numbers, NUMBERS), backgrounds], take)?;
             let pairs = known.unwrap_or(numbers[0]);
             if pairs > frame.pair_capacity {
+                memory.give_back(readback);
                 (memory.splats_of, memory.pairs_of) = (Some(splats_of), None);
                 if u64::from(pairs) > most_pairs {
                     return Ok(None);
@@ -232,6 +235,7 @@ impl GpuRenderer {
                 stages.back(frame, counters, per, pair, band, back, [depth_bits, tile_bits]);
                 stages.submit();
             }
+            memory.give_back(readback);
             let [r, g, b, is_cut_short] = background;
             if is_cut_short > 0.0 {
                 return Err(self.device.cuts_loops_short());
@@ -255,10 +259,10 @@ impl GpuRenderer {
         let Some(back) = &memory.back else { return Ok((sums, flags)) };
         let mut stages = Stages::new(&self.device, &self.kernels);
         stages.read_sums(back);
-        stages.submit();
+        let submission = stages.submit();
         let buffers: Vec<_> = back.sums.iter().map(|s| (&s.readback, SUMS * s.count as u64 + 4)).collect();
         let (mut first, mut is_cut_short) = (0, false);
-        self.device.read(&buffers, |i, bytes| {
+        self.device.read(submission, &buffers, |i, bytes| {
             let chunk = first..first + back.sums[i].count;
             let (of_sums, rest) = bytes.split_at(40 * chunk.len());
             let (of_flags, of_loops) = rest.split_at(4 * chunk.len());

@@ -146,8 +146,20 @@ pub(super) struct PerPair {
 pub(super) struct PerBand {
     pub(super) ranges: wgpu::Buffer,
     pub(super) picture: wgpu::Buffer,
-    /// Of `picture`, where the processor can read it.
-    pub(super) readback: wgpu::Buffer,
+}
+
+/// Where the processor reads what a slice left.
+#[derive(Debug)]
+pub(super) struct Readback {
+    /// How many pairs there were, the slice's end, and whether a pixel is not finished.
+    pub(super) numbers: wgpu::Buffer,
+    pub(super) picture: wgpu::Buffer,
+}
+
+impl Readback {
+    fn bytes(&self) -> u64 {
+        self.numbers.size() + self.picture.size()
+    }
 }
 
 /// What the way back needs.
@@ -202,10 +214,10 @@ pub(super) struct Counters {
     pub(super) slice_end: wgpu::Buffer,
     /// Whether a pixel is not finished.
     pub(super) unfinished: wgpu::Buffer,
-    /// How many pairs there were, the slice's end, and whether a pixel is not finished, for the processor.
-    pub(super) readback: wgpu::Buffer,
 }
 
+/// Bytes of what a slice says of itself.
+pub(super) const NUMBERS: u64 = 12;
 /// Bytes of a pixel: colour, alpha, depth.
 pub(super) const PIXEL: u64 = 20;
 /// Bytes of a splat.
@@ -220,7 +232,8 @@ pub(super) const BACKGROUND: u64 = 16;
 /// What a frame is drawn of: the asset's id, and what of the frame matters.
 pub(super) type Made = (u64, Frame);
 
-/// All of it.
+/// All of it. What is submitted is done in its order, so that one is enough for all that follows; but for what the
+/// processor reads, which it may come to after the next was submitted.
 #[derive(Debug)]
 pub(super) struct Memory {
     pub(super) counters: Counters,
@@ -228,6 +241,10 @@ pub(super) struct Memory {
     pub(super) pair: Option<PerPair>,
     pub(super) band: Option<PerBand>,
     pub(super) back: Option<Back>,
+    /// Those that nobody is to read.
+    readbacks: Vec<Readback>,
+    /// Submissions that made lists of pairs.
+    pub(super) listings: u64,
     /// Whose splats are there, in their order.
     pub(super) splats_of: Option<Made>,
     /// Whose pairs are listed, all of a window's, and how many there are.
@@ -241,9 +258,36 @@ impl Memory {
             gaussians: words(device, "gaussians", 1),
             slice_end: words(device, "slice end", 1),
             unfinished: words(device, "unfinished", 1),
-            readback: readable(device, "counters", 12),
         };
-        Self { counters, gaussian: None, pair: None, band: None, back: None, splats_of: None, pairs_of: None }
+        Self {
+            counters,
+            gaussian: None,
+            pair: None,
+            band: None,
+            back: None,
+            readbacks: Vec::new(),
+            listings: 0,
+            splats_of: None,
+            pairs_of: None,
+        }
+    }
+
+    /// Room for the processor to read the numbers and so many bytes of a picture. It is given back when it was read.
+    pub(super) fn readback(&mut self, device: &Device, bytes: u64) -> Readback {
+        if let Some(i) = self.readbacks.iter().position(|r| r.picture.size() >= bytes) {
+            return self.readbacks.swap_remove(i);
+        }
+        // One that is too small goes first.
+        self.readbacks.pop();
+        Readback {
+            numbers: readable(device, "numbers to read", NUMBERS),
+            picture: readable(device, "picture to read", bytes.max(4)),
+        }
+    }
+
+    /// What [`Memory::readback`] lent.
+    pub(super) fn give_back(&mut self, readback: Readback) {
+        self.readbacks.push(readback);
     }
 
     /// Room for at least `count` Gaussians.
@@ -284,8 +328,7 @@ impl Memory {
         self.band = None;
         self.pairs_of = None;
         let picture = storage(device, "picture", PIXEL * pixels);
-        let readback = readable(device, "picture to read", picture.size());
-        self.band = Some(PerBand { ranges: storage(device, "ranges", 8 * tiles), picture, readback });
+        self.band = Some(PerBand { ranges: storage(device, "ranges", 8 * tiles), picture });
     }
 
     /// Room to go back with `count` Gaussians and at least so many tiles and pixels of a band.
@@ -336,8 +379,9 @@ impl Memory {
             .as_ref()
             .map_or(0, |g| g.splats.size() + g.tints.size() + g.depths.bytes() + g.offsets.bytes());
         let pair = self.pair.as_ref().map_or(0, |p| p.tiles.bytes() + p.splats.size());
-        let band = self.band.as_ref().map_or(0, |b| b.ranges.size() + 2 * b.picture.size());
+        let band = self.band.as_ref().map_or(0, |b| b.ranges.size() + b.picture.size());
         let back = self.back.as_ref().map_or(0, Back::bytes);
-        gaussian + pair + band + back
+        let readbacks: u64 = self.readbacks.iter().map(Readback::bytes).sum();
+        gaussian + pair + band + back + readbacks
     }
 }

@@ -2,10 +2,11 @@
 //! without a window.
 //!
 //! `draw` has the stages of a picture in their order: `project` (one Gaussian a thread), sort by depth, list (tile,
-//! splat) pairs, sort by tile, `blend` (one pixel a thread); `gradients` those of the way back. Nothing depends on the
-//! order of threads: the same device draws the same bytes. `docs/GPU.md` has the measurements.
+//! splat) pairs, sort by tile, `blend` (one pixel a thread); `gradients` those of the way back; `batch` keeps the device
+//! busy while pictures are read. Nothing depends on the order of threads: the same device draws the same bytes. `docs/GPU.md` has the measurements.
 
 mod asset;
+mod batch;
 mod device;
 mod draw;
 mod frame;
@@ -16,6 +17,7 @@ mod stages;
 
 pub use asset::GpuAsset;
 pub use device::Adapter;
+pub use draw::Target;
 
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
@@ -23,7 +25,6 @@ use crate::geometry::Camera;
 use crate::render::distorted::LensMap;
 use crate::render::{CpuRenderer, RenderOptions, Rendered, Renderer, Rgba8};
 use device::Device;
-use draw::Target;
 use kernels::Kernels;
 use memory::{Memory, SPLAT};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};

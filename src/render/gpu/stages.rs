@@ -6,7 +6,7 @@ use super::device::Device;
 use super::frame::Frame;
 use super::kernels::Kernels;
 use super::memory::{
-    BACKGROUND, Back, Counters, DIGIT_BITS, Entries, PerBand, PerGaussian, PerPair, SUMS, Sums,
+    BACKGROUND, Back, Counters, DIGIT_BITS, Entries, PerBand, PerGaussian, PerPair, Readback, SUMS, Sums,
 };
 
 /// Commands on their way to the device.
@@ -199,22 +199,23 @@ impl<'a> Stages<'a> {
         counters: &Counters,
         per: &PerGaussian,
         band: &PerBand,
+        to: &Readback,
         part: Option<[u64; 2]>,
     ) {
         self.close();
         let numbers = [per.offsets.total(), &counters.slice_end, &counters.unfinished];
         for (i, from) in numbers.into_iter().enumerate() {
-            self.encoder.copy_buffer_to_buffer(from, 0, &counters.readback, 4 * i as u64, 4);
+            self.encoder.copy_buffer_to_buffer(from, 0, &to.numbers, 4 * i as u64, 4);
         }
         if let Some([from, bytes]) = part {
-            self.encoder.copy_buffer_to_buffer(&band.picture, from, &band.readback, 0, bytes);
+            self.encoder.copy_buffer_to_buffer(&band.picture, from, &to.picture, 0, bytes);
         }
     }
 
     /// Hands everything to the device.
-    pub(super) fn submit(mut self) {
+    pub(super) fn submit(mut self) -> wgpu::SubmissionIndex {
         self.close();
-        self.device.queue.submit([self.encoder.finish()]);
+        self.device.queue.submit([self.encoder.finish()])
     }
 
     /// `entries` by the lowest `bits` of their keys, stably; the first pass leaves out what is not drawn.

@@ -97,6 +97,17 @@ class Renderer:
         far: float = 1e10,
         sh_degree: int = 3,
     ) -> npt.NDArray[np.uint8]: ...
+    def render_many(
+        self,
+        cameras: Sequence[Camera],
+        background: str | npt.ArrayLike = "white",
+        threads: int = 0,
+        *,
+        antialiased: bool = False,
+        near: float = 0.01,
+        far: float = 1e10,
+        sh_degree: int = 3,
+    ) -> list[npt.NDArray[np.uint8]]: ...
 
 @final
 class Gaussians:
