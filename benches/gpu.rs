@@ -6,7 +6,8 @@
 //! cargo bench ... --bench gpu -- 200000            chosen sizes
 //! ```
 //!
-//! `benches/gpu_vs_gsplat` runs it with gsplat's CUDA kernels beside, where there is an NVIDIA GPU. Both draw the same picture in turns in one run. `WGPU_ADAPTER_NAME` chooses among several adapters.
+//! `benches/gpu_vs_gsplat` runs it with gsplat's CUDA kernels beside, where there is an NVIDIA GPU. Both draw the same
+//! picture in turns in one run. `WGPU_ADAPTER_NAME` chooses among several adapters.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -52,12 +53,13 @@ fn main() {
     print_error(&gpu);
     println!("milliseconds; MiB; mean and largest difference of colour from the CPU's");
     println!(
-        "{:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>6} {:>8} {:>8} {:>6} {:>6} {:>7} {:>8}",
+        "{:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>6} {:>8} {:>8} {:>6} {:>6} {:>7} {:>8}",
         "Gaussians",
         "pixels",
         "first",
         "planes",
         "bytes",
+        "of many",
         "cpu",
         "ratio",
         "both",
@@ -78,7 +80,8 @@ fn main() {
     }
 }
 
-/// One line: a picture of planes, one of bytes, and a picture with its gradients, by the device and by the CPU in turns.
+/// One line: a picture of planes, one of bytes, one of several in a call, and one with its gradients, by the device and by
+/// the CPU in turns.
 fn row(gpu: &GpuRenderer, cpu: &CpuRenderer, gaussians: &Gaussians, width: u32, height: u32) -> [Camera; 2] {
     // In turns: of a view that was drawn last the device has the order already.
     let cameras = [0.75, -0.75].map(|x| looking_at_origin(width, height, DVec3::new(x, -0.55, 0.36), 8.0));
@@ -86,7 +89,9 @@ fn row(gpu: &GpuRenderer, cpu: &CpuRenderer, gaussians: &Gaussians, width: u32, 
     let (asset, uploaded) = timed(|| gpu.upload(gaussians).unwrap_or_else(|e| panic!("{e}")));
     let (mut by_gpu, mut by_cpu, mut bytes) = (Rendered::default(), Rendered::default(), Rgba8::default());
     let (_, first) = timed(|| gpu.render_asset_into(&asset, &cameras[1], &options, &mut by_gpu).unwrap());
-    let mut times: [Vec<Duration>; 5] = Default::default();
+    let several = [cameras[0], cameras[1], cameras[0], cameras[1]];
+    let mut copy = Vec::new();
+    let mut times: [Vec<Duration>; 6] = Default::default();
     let (mut of_picture, mut gradients) = (PictureGradient::default(), Gradients::default());
     let begin = Instant::now();
     for i in 0.. {
@@ -98,11 +103,17 @@ fn row(gpu: &GpuRenderer, cpu: &CpuRenderer, gaussians: &Gaussians, width: u32, 
         times[0].push(timed(|| gpu.render_asset_into(&asset, camera, &options, &mut by_gpu).unwrap()).1);
         times[1].push(timed(|| gpu.render_asset_rgba8(&asset, other, &options, &mut bytes).unwrap()).1);
         times[2].push(timed(|| cpu.render_into(gaussians, camera, &options, &mut by_cpu).unwrap()).1);
+        let take = |_: usize, picture: &Rgba8| {
+            copy.clone_from(&picture.pixels);
+            Ok(())
+        };
+        let all = || gpu.render_each(&asset, &several, &options, &mut bytes, take).unwrap();
+        times[3].push(timed(all).1 / several.len() as u32);
         if gaussians.len() > MOST_BOTH_WAYS {
             continue;
         }
         let renderers = [gpu as &dyn Differentiable, cpu];
-        for (renderer, times) in renderers.into_iter().zip(&mut times[3..]) {
+        for (renderer, times) in renderers.into_iter().zip(&mut times[4..]) {
             let mut picture = Rendered::default();
             let targets = (&mut picture, &mut of_picture, &mut gradients);
             let way = || renderer.both_ways(gaussians, camera, &options, targets, &mut mean_square).unwrap();
@@ -110,16 +121,17 @@ fn row(gpu: &GpuRenderer, cpu: &CpuRenderer, gaussians: &Gaussians, width: u32, 
         }
     }
     let [color, ..] = compare(&by_gpu, &by_cpu);
-    let [planes, bytes, by_cpu, back, cpu_back] =
+    let [planes, bytes, by_cpu, of_many, back, cpu_back] =
         times.map(|mut t| if t.is_empty() { f64::NAN } else { ms(median(&mut t)) });
     let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     println!(
-        "{:>9} {:>9} {:>8.1} {:>8.1} {:>8.1} {:>8.1} {:>6.2} {:>8.1} {:>8.1} {:>6.2} {:>6.0} {:>7.0} {:>8.1}  {:.1e} {:.1e}",
+        "{:>9} {:>9} {:>8.1} {:>8.1} {:>8.1} {:>8.1} {:>8.1} {:>6.2} {:>8.1} {:>8.1} {:>6.2} {:>6.0} {:>7.0} {:>8.1}  {:.1e} {:.1e}",
         gaussians.len(),
         format!("{width}x{height}"),
         ms(first),
         planes,
         bytes,
+        of_many,
         by_cpu,
         planes / by_cpu,
         back,

@@ -21,7 +21,7 @@ pub(super) struct Kernels {
 /// What several shaders begin with.
 const FRAME: &str = include_str!("shaders/frame.wgsl");
 /// What both directions of blending begin with.
-const ALPHA: &str = include_str!("shaders/alpha.wgsl");
+const LAYERS: &str = include_str!("shaders/layers.wgsl");
 
 impl Kernels {
     pub(super) fn new(device: &Device) -> Self {
@@ -44,7 +44,7 @@ impl Kernels {
                 cache: None,
             })
         };
-        let blending = |name: &str, source: &str| module(name, &format!("{ALPHA}\n{source}"));
+        let blending = |name: &str, source: &str| module(name, &format!("{LAYERS}\n{source}"));
         let scan = module("scan", include_str!("shaders/scan.wgsl"));
         let sort = module("sort", include_str!("shaders/sort.wgsl"));
         let tiles = module("tiles", include_str!("shaders/tiles.wgsl"));

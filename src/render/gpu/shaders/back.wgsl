@@ -10,13 +10,6 @@
 // Then it has a quarter of a layer's pixels, and adds up: one sum per pair, in the order of pixels, so that nothing
 // hangs on the order of threads and no two of them add to the same number.
 
-@group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<storage, read> ranges: array<vec2<u32>>;
-// Pairs by tile, nearest first.
-@group(0) @binding(2) var<storage, read> pairs: array<u32>;
-@group(0) @binding(3) var<storage, read> pair_splats: array<u32>;
-@group(0) @binding(4) var<storage, read> splats: array<Splat>;
-@group(0) @binding(5) var<storage, read> tints: array<vec4<f32>>;
 // Of the band's pixels: red, green, blue, alpha, depth.
 @group(0) @binding(6) var<storage, read> gradient: array<f32>;
 // [held_pairs][10]: w, w t, w s, w t t, w t s, w s s, red, green, blue, depth; (t, s) is the offset whitened, with
@@ -26,15 +19,12 @@
 // Not vectors: threads may not write to one vector's components at once.
 @group(0) @binding(8) var<storage, read_write> backgrounds: array<f32>;
 
-const PIXELS: u32 = TILE * TILE;
 // Layers of one turn.
 const LAYERS: u32 = 16u;
 // Words between two layers' pixels: four of them lie in different banks.
 const STRIDE: u32 = PIXELS + 4u;
 const SUMS: u32 = 10u;
 
-var<workgroup> batch: array<Splat, PIXELS>;
-var<workgroup> batch_tints: array<vec4<f32>, PIXELS>;
 var<workgroup> batch_pairs: array<u32, LAYERS>;
 // w and T alpha.
 var<workgroup> weights: array<vec2<f32>, 1088>;
@@ -42,8 +32,7 @@ var<workgroup> weights: array<vec2<f32>, 1088>;
 var<workgroup> upstream: array<vec4<f32>, PIXELS>;
 // [LAYERS][4][SUMS]
 var<workgroup> quarters: array<f32, 640>;
-var<workgroup> live: atomic<u32>;
-var<workgroup> shared_number: u32;
+var<workgroup> last_layer: atomic<u32>;
 
 fn pixel_center(group: vec2<u32>, lane: u32) -> vec2<f32> {
     let x = (frame.first_tile_column + group.x) * TILE + lane % TILE;
@@ -72,27 +61,11 @@ fn back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     // Past the last layer that was drawn.
     var end = range.x;
     for (var begin = range.x; begin < range.y; begin += PIXELS) {
-        if (lane == 0u) {
-            atomicStore(&live, 0u);
-        }
-        workgroupBarrier();
-        if (t > 0.0) {
-            atomicStore(&live, 1u);
-        }
-        workgroupBarrier();
-        if (lane == 0u) {
-            shared_number = atomicLoad(&live);
-        }
-        if (workgroupUniformLoad(&shared_number) == 0u) {
+        if (!is_any(t > 0.0, lane)) {
             break;
         }
         let count = min(range.y - begin, PIXELS);
-        if (lane < count) {
-            let splat = pair_splats[pairs[begin + lane]];
-            batch[lane] = splats[splat];
-            batch_tints[lane] = tints[splat];
-        }
-        workgroupBarrier();
+        take(begin, count, lane);
         for (var k = 0u; k < count && t > 0.0; k++) {
             let s = batch[k];
             let alpha = alpha_of(s, offset_of(s, center));
@@ -129,10 +102,10 @@ fn back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     workgroupBarrier();
     upstream[lane] = toward * select(0.0, t, is_inside);
     if (lane == 0u) {
-        atomicStore(&live, range.x);
+        atomicStore(&last_layer, range.x);
     }
     workgroupBarrier();
-    atomicMax(&live, end);
+    atomicMax(&last_layer, end);
     if (lane == 3u) {
         backgrounds[4u * tile + 3u] = 0.0;
     }
@@ -147,7 +120,7 @@ fn back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     workgroupBarrier();
     upstream[lane] = toward;
     if (lane == 0u) {
-        shared_number = atomicLoad(&live);
+        shared_number = atomicLoad(&last_layer);
     }
     let last = workgroupUniformLoad(&shared_number);
     // Layers that nobody sees.
@@ -165,13 +138,9 @@ fn back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         let begin = stop - count;
         stop = begin;
         if (lane < count) {
-            let pair = pairs[begin + lane];
-            let splat = pair_splats[pair];
-            batch_pairs[lane] = pair;
-            batch[lane] = splats[splat];
-            batch_tints[lane] = tints[splat];
+            batch_pairs[lane] = pairs[begin + lane];
         }
-        workgroupBarrier();
+        take(begin, count, lane);
         for (var k = count; k > 0u;) {
             k--;
             var w = 0.0;

@@ -1,25 +1,11 @@
 // Front-to-back blending of one tile, a pixel a thread.
 
-@group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<storage, read> ranges: array<vec2<u32>>;
-// Pairs by tile, nearest first.
-@group(0) @binding(2) var<storage, read> pairs: array<u32>;
-@group(0) @binding(3) var<storage, read> pair_splats: array<u32>;
-@group(0) @binding(4) var<storage, read> splats: array<Splat>;
-@group(0) @binding(5) var<storage, read> tints: array<vec4<f32>>;
 // The band's planes: colour [pixels][3], alpha [pixels], depth [pixels]. Between slices the plane of alpha holds the
 // transmittance, negative where the pixel is finished. A picture of bytes takes the plane of depth, and leaves the rest.
 // As bits: not every pattern of bytes is a float that survives.
 @group(0) @binding(6) var<storage, read_write> picture: array<u32>;
 // 1: a pixel is not finished; 2: the driver left a loop before its end.
 @group(0) @binding(7) var<storage, read_write> unfinished: array<atomic<u32>>;
-
-const PIXELS: u32 = TILE * TILE;
-
-var<workgroup> batch: array<Splat, PIXELS>;
-var<workgroup> batch_tints: array<vec4<f32>, PIXELS>;
-var<workgroup> live: atomic<u32>;
-var<workgroup> is_live: u32;
 
 // `is_last` of a picture of bytes.
 const BYTES: u32 = 2u;
@@ -63,27 +49,11 @@ fn blend(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
 
     let range = ranges[group.y * frame.tile_columns + group.x];
     for (var begin = range.x; begin < range.y; begin += PIXELS) {
-        if (lane == 0u) {
-            atomicStore(&live, 0u);
-        }
-        workgroupBarrier();
-        if (t > 0.0) {
-            atomicStore(&live, 1u);
-        }
-        workgroupBarrier();
-        if (lane == 0u) {
-            is_live = atomicLoad(&live);
-        }
-        if (workgroupUniformLoad(&is_live) == 0u) {
+        if (!is_any(t > 0.0, lane)) {
             break;
         }
         let count = min(range.y - begin, PIXELS);
-        if (lane < count) {
-            let splat = pair_splats[pairs[begin + lane]];
-            batch[lane] = splats[splat];
-            batch_tints[lane] = tints[splat];
-        }
-        workgroupBarrier();
+        take(begin, count, lane);
         for (var k = 0u; k < count && t > 0.0; k++) {
             let s = batch[k];
             let alpha = alpha_of(s, offset_of(s, center));
