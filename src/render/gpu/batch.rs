@@ -24,20 +24,18 @@ impl GpuRenderer {
         mut take: impl FnMut(usize, &P) -> Result<()>,
     ) -> Result<()> {
         let mut before = None;
-        let mut in_slices = false;
         for i in 0..=cameras.len() {
             let next = match cameras.get(i) {
-                Some(camera) if !in_slices => self.begin(asset, camera, options, picture.target().pixels()),
-                _ => Ok(None),
+                Some(camera) => self.begin(asset, camera, options, picture.target().pixels()),
+                None => Ok(None),
             };
             if let Some(drawn) = i.checked_sub(1) {
                 let camera = &cameras[drawn];
-                let end = match before.take() {
+                let is_whole = match before.take() {
                     Some(flight) => self.end(flight, camera, &mut picture.target())?,
-                    None => End::Small,
+                    None => false,
                 };
-                in_slices |= matches!(end, End::InSlices);
-                if !matches!(end, End::Whole) {
+                if !is_whole {
                     picture.draw_on(self, asset, camera, options)?;
                 }
                 take(drawn, picture)?;
@@ -63,7 +61,7 @@ impl GpuRenderer {
         let mut held = self.lock();
         let mut memory = held.take().unwrap_or_else(|| Memory::new(&self.device));
         let (mut frame, depth_bits) = self.frame(asset, camera, options, &mut memory);
-        if self.rows_of_a_band(camera) < frame.tile_rows {
+        if self.rows_of_a_band(camera) < frame.tile_rows || memory.in_slices == Some(asset.id) {
             *held = Some(memory);
             return Ok(None);
         }
@@ -79,32 +77,18 @@ impl GpuRenderer {
         Ok(Some(flight))
     }
 
-    /// Waits for a picture.
-    fn end(&self, flight: Flight, camera: &Camera, target: &mut Target) -> Result<End> {
+    /// Waits for a picture; `false` if it was not all of it.
+    fn end(&self, flight: Flight, camera: &Camera, target: &mut Target) -> Result<bool> {
         let mut held = self.lock();
         let mut memory = held.take().unwrap_or_else(|| Memory::new(&self.device));
         target.resize(camera);
         let slice = self.finish_slice(flight, &mut memory, target)?;
         let most = self.bounds.pairs.max(tiles(camera, camera.height.div_ceil(TILE)));
         let needed = u64::from(slice.pairs).next_power_of_two();
-        let end = if slice.is_whole() {
-            End::Whole
-        } else if slice.is_cut_short || needed > most {
-            End::InSlices
-        } else {
+        if !slice.is_whole() && needed <= most {
             memory.for_pairs(&self.device, needed);
-            End::Small
-        };
+        }
         *held = Some(memory);
-        Ok(end)
+        Ok(slice.is_whole())
     }
-}
-
-/// How a picture went.
-enum End {
-    Whole,
-    /// There was no room for its pairs, and is now.
-    Small,
-    /// There is none.
-    InSlices,
 }

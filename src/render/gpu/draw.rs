@@ -101,6 +101,7 @@ impl GpuRenderer {
         let last = target.pixels().last();
         (frame.slice_start, frame.is_first, frame.is_last) = (0, 1, last);
         frame.slice_splats = u32::MAX;
+        memory.in_slices = None;
         loop {
             memory.for_pairs(&self.device, wanted);
             let slice = self.draw_slice(asset, camera, frame, depth_bits, memory, target)?;
@@ -110,6 +111,7 @@ impl GpuRenderer {
                 }
                 // Anew, in slices whose lists the driver goes through to the end.
                 frame.slice_splats = FEW;
+                memory.in_slices = Some(asset.id);
                 (frame.slice_start, frame.is_first, frame.is_last) = (0, 1, 0);
                 continue;
             }
@@ -121,8 +123,12 @@ impl GpuRenderer {
                 // Nothing is drawn yet that counts: once more with room for all, or in slices. These grow: the first
                 // of them finish the pixels of what is opaque.
                 let needed = u64::from(slice.pairs).next_power_of_two();
-                frame.is_last = if needed <= most_pairs { last } else { 0 };
-                wanted = if needed <= most_pairs { needed } else { wanted };
+                if needed <= most_pairs {
+                    wanted = needed;
+                } else {
+                    frame.is_last = 0;
+                    memory.in_slices = Some(asset.id);
+                }
                 continue;
             }
             frame.is_first = 0;
@@ -256,7 +262,7 @@ pub(super) struct Slice {
     /// Rank of the first splat that is not in it, or `u32::MAX`.
     end: u32,
     is_unfinished: bool,
-    pub(super) is_cut_short: bool,
+    is_cut_short: bool,
 }
 
 impl Slice {

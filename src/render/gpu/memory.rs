@@ -243,6 +243,8 @@ pub(super) struct Memory {
     pub(super) back: Option<Back>,
     /// Those that nobody is to read.
     readbacks: Vec<Readback>,
+    /// The asset whose last picture did not go in one slice.
+    pub(super) in_slices: Option<u64>,
     /// Submissions that made lists of pairs.
     pub(super) listings: u64,
     /// Whose splats are there, in their order.
@@ -266,6 +268,7 @@ impl Memory {
             band: None,
             back: None,
             readbacks: Vec::new(),
+            in_slices: None,
             listings: 0,
             splats_of: None,
             pairs_of: None,
