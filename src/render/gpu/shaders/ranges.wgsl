@@ -2,8 +2,8 @@
 
 @group(0) @binding(0) var<storage, read> counter: array<u32>;
 @group(0) @binding(1) var<storage, read> pair_tiles: array<u32>;
-// [tiles]: begin, end; zero before.
-@group(0) @binding(2) var<storage, read_write> ranges: array<vec2<u32>>;
+// [tiles][2]: begin, end; zero before. Not vectors: threads may not write to one vector's components at once.
+@group(0) @binding(2) var<storage, read_write> ranges: array<u32>;
 
 @compute @workgroup_size(256)
 fn find(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -14,9 +14,9 @@ fn find(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let tile = pair_tiles[i];
     if (i == 0u || pair_tiles[i - 1u] != tile) {
-        ranges[tile].x = i;
+        ranges[2u * tile] = i;
     }
     if (i + 1u == count || pair_tiles[i + 1u] != tile) {
-        ranges[tile].y = i + 1u;
+        ranges[2u * tile + 1u] = i + 1u;
     }
 }
