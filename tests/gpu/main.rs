@@ -123,6 +123,21 @@ fn bands_slices_chunks_and_repetition_change_no_byte() {
 }
 
 #[test]
+fn more_pairs_than_one_command_has_threads_change_no_byte() {
+    let Some(gpu) = renderer() else { return };
+    // In 65,536 tiles: 19.7 M pairs. A command has 16.7 M threads in groups of 256.
+    let gaussians = walls(300, 0.5, 100.0);
+    let camera = forward(2048, 2048, 1000.0);
+    let expected = CpuRenderer::new().render(&gaussians, &camera, &options()).unwrap();
+    let found = gpu.render(&gaussians, &camera, &options()).unwrap();
+    assert_close("many pairs", &found, &expected, 1e-6, 2e-5);
+    let slices = renderer().unwrap().bounded(|b| b.pairs = 1 << 20);
+    assert!(slices.render(&gaussians, &camera, &options()).unwrap() == found);
+    let held = [&gpu, &slices].map(GpuRenderer::working_bytes);
+    assert!(held[0] > held[1] + (500 << 20), "not in one slice: {held:?} bytes");
+}
+
+#[test]
 fn gradients_are_the_same_bytes_in_bands_windows_and_repeated_walks() {
     let Some(gpu) = renderer() else { return };
     let mut gaussians = random(10, 2000, 2, [0.005, 0.2]);

@@ -84,9 +84,9 @@ impl GpuRenderer {
         target.resize(camera);
         let slice = self.finish_slice(flight, &mut memory, target)?;
         let most = self.bounds.pairs.max(tiles(camera, camera.height.div_ceil(TILE)));
-        let needed = u64::from(slice.pairs).next_power_of_two();
+        let needed = u64::from(slice.pairs);
         if !slice.is_whole() && needed <= most {
-            memory.for_pairs(&self.device, needed);
+            memory.for_pairs(&self.device, needed.next_power_of_two().min(most));
         }
         *held = Some(memory);
         Ok(slice.is_whole())

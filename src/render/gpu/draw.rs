@@ -122,9 +122,9 @@ impl GpuRenderer {
             if frame.is_last != 0 {
                 // Nothing is drawn yet that counts: once more with room for all, or in slices. These grow: the first
                 // of them finish the pixels of what is opaque.
-                let needed = u64::from(slice.pairs).next_power_of_two();
+                let needed = u64::from(slice.pairs);
                 if needed <= most_pairs {
-                    wanted = needed;
+                    wanted = needed.next_power_of_two().min(most_pairs);
                 } else {
                     frame.is_last = 0;
                     memory.in_slices = Some(asset.id);

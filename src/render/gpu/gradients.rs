@@ -4,12 +4,12 @@
 //! The way back needs all pairs of a tile at once. Where those of a band do not fit it is halved, down to single tiles;
 //! where the pairs' shares do not fit the walk is repeated for the next pairs. One walk is the rule.
 
+use super::GpuRenderer;
 use super::asset::GpuAsset;
 use super::draw::{Rows, Target, first_guess, pixels, tiles};
 use super::frame::{Frame, TILE};
 use super::memory::{BACKGROUND, Memory, NUMBERS, PIXEL, SHARE, SUMS};
 use super::stages::{Stages, bits_of};
-use super::{GpuRenderer, MOST_THREADS};
 use crate::error::Result;
 use crate::gaussians::Gaussians;
 use crate::geometry::Camera;
@@ -170,7 +170,7 @@ impl GpuRenderer {
         (frame.first_tile_column, frame.tile_columns) = (window.columns.first, window.columns.count);
         let tile_bits = bits_of(window.tiles() as u32);
         // A splat has one pair in a tile: those of one tile fit.
-        let most_pairs = self.bounds.pairs.max(asset.count as u64).min(MOST_THREADS);
+        let most_pairs = self.bounds.pairs.max(asset.count as u64);
         let mut wanted = first_guess(asset, most_pairs);
         loop {
             memory.for_pairs(&self.device, wanted);

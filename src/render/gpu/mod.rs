@@ -33,9 +33,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 #[derive(Clone, Copy, Debug)]
 #[doc(hidden)]
 pub struct Bounds {
-    /// (tile, splat) pairs: 320 MiB of them.
+    /// (tile, splat) pairs: 640 MiB of them.
     pub pairs: u64,
-    /// Pairs whose gradients are held: as much again.
+    /// Pairs whose gradients are held: 320 MiB.
     pub shares: u64,
     /// Pixels of a band: 80 MiB, and as many to be read.
     pub pixels: u64,
@@ -49,8 +49,11 @@ const MOST_TILES: u64 = 1 << 16;
 /// Groups of threads that one command may start.
 const MOST_GROUPS: u64 = 65_535;
 
-/// Gaussians of one asset, and pairs held at a time: a thread for each, in groups of 256.
-const MOST_THREADS: u64 = 256 * MOST_GROUPS - 1;
+/// Gaussians of one asset: a thread for each and one more, in groups of 256.
+const MOST_GAUSSIANS: u64 = 256 * MOST_GROUPS - 1;
+
+/// (tile, splat) pairs held at a time: what fits in the smallest binding that drivers allow, 128 MiB.
+const MOST_PAIRS: u64 = 1 << 25;
 
 /// Draws on a graphics processor. Device, kernels and working memory are made once and kept; may be shared between
 /// threads, which then draw one after the other.
@@ -75,8 +78,8 @@ impl GpuRenderer {
         let device = Device::open(adapter)?;
         let kernels = Kernels::new(&device);
         device.check()?;
-        let bounds =
-            Bounds { pairs: MOST_THREADS, shares: 1 << 23, pixels: 1 << 22, binding: device.largest_binding };
+        let binding = device.largest_binding;
+        let bounds = Bounds { pairs: MOST_PAIRS.min(binding / 4), shares: 1 << 23, pixels: 1 << 22, binding };
         let cpu = CpuRenderer::new();
         Ok(Self { device, kernels, cpu, bounds, memory: Mutex::default(), lens: Mutex::default() })
     }
@@ -108,7 +111,7 @@ impl GpuRenderer {
 
     /// The most Gaussians that one asset may have here.
     pub fn most_gaussians(&self) -> u64 {
-        MOST_THREADS.min(self.bounds.binding / SPLAT)
+        MOST_GAUSSIANS.min(self.bounds.binding / SPLAT)
     }
 
     /// Working memory that is held on the device, bytes; assets are beside it.

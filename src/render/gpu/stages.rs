@@ -102,7 +102,8 @@ impl<'a> Stages<'a> {
         self.encoder.clear_buffer(&band.ranges, 0, None);
         let tiles = &pair.tiles.keys[passes(bits) % 2];
         let bindings = [(0, pair.tiles.histogram.total()), (1, tiles), (2, &band.ranges)];
-        self.run(&self.kernels.find_ranges, &bindings, [pair.tiles.capacity.div_ceil(256) as u32, 1]);
+        let groups = pair.tiles.capacity.div_ceil(256).min(MOST_GROUPS) as u32;
+        self.run(&self.kernels.find_ranges, &bindings, [groups, 1]);
     }
 
     /// Blends the band's tiles.
