@@ -35,6 +35,13 @@ const GAP_SHARE: f64 = 0.75;
 /// Wider gaps are holes in the scan, pixels.
 const WIDEST_GAP_PX: f64 = 2.0;
 
+/// Beyond an edge that looks into a gap of an open structure, a ladder or a rack, the outermost point is another rung's:
+/// gaps are narrower than this, pixels; what is farther is not looked for.
+const OPEN_PX: i32 = 14;
+
+/// Part of the edges that must be open, or all are compared.
+const LEAST_OPEN: f64 = 0.1;
+
 /// Points nearer to a camera than this have no place in its picture, metres.
 const NEAR_M: f64 = 0.05;
 
@@ -49,6 +56,8 @@ pub(super) struct Outline {
     support: Vec<(DVec2, f64)>,
     /// Middle of a piece of edge, and outward unit normal.
     edges: Vec<(DVec2, DVec2)>,
+    /// Whether an edge looks out into the open: no vehicle within [`OPEN_PX`] beyond it.
+    open: Vec<bool>,
 }
 
 impl Outline {
@@ -64,6 +73,7 @@ impl Outline {
             labels,
             support: Vec::new(),
             edges: Vec::new(),
+            open: Vec::new(),
         };
         outline.find_edges();
         outline.find_support();
@@ -97,6 +107,15 @@ impl Outline {
             }
         }
         self.edges = edges.into_iter().step_by(EDGE_STRIDE).collect();
+        self.open = self.edges.iter().map(|edge| self.is_open(edge)).collect();
+    }
+
+    fn is_open(&self, &(middle, normal): &(DVec2, DVec2)) -> bool {
+        // The first two pixels may be the rough edge's own.
+        (2..=OPEN_PX).all(|step| {
+            let pixel = middle + f64::from(step) * normal;
+            self.label(pixel.x.floor() as i64, pixel.y.floor() as i64) != Label::Vehicle
+        })
     }
 
     /// Away from the vehicle pixels around, `None` where the picture's border is near or the edge is a speck's.
@@ -340,6 +359,8 @@ pub(super) fn fine(
 pub(super) struct Misses {
     /// Mean over all pieces of edge, pixels; where no point is near, the reach.
     pub(super) mean_px: f64,
+    /// The same over the pieces that look out into the open, which can be compared whatever the structure.
+    pub(super) open_px: f64,
     /// Median, metres at the point's distance; infinite where most have no point near.
     pub(super) median_m: f64,
 }
@@ -351,11 +372,21 @@ pub(super) fn misses(outlines: &[Outline], points: &[DVec3], s: &Similarity, rea
         let focal = o.intrinsics.smaller_focal();
         let far = (reach, f64::INFINITY);
         let sizes = |m: Option<Miss>| m.map_or(far, |m| (m.out.abs(), m.out.abs() * m.distance / focal));
-        found.into_iter().map(sizes).collect::<Vec<_>>()
+        let sizes = |(m, open): (Option<Miss>, &bool)| {
+            let (pixels, metres) = sizes(m);
+            (pixels, metres, *open)
+        };
+        found.into_iter().zip(&o.open).map(sizes).collect::<Vec<_>>()
     };
-    let all: Vec<(f64, f64)> =
+    let all: Vec<(f64, f64, bool)> =
         outlines.par_iter().map(of).collect::<Vec<_>>().into_iter().flatten().collect();
     let metres: Vec<f64> = all.iter().map(|m| m.1).collect();
-    let mean_px = all.iter().map(|m| m.0).sum::<f64>() / all.len().max(1) as f64;
-    Misses { mean_px, median_m: super::scan::median(&metres) }
+    let mean = |chosen: &dyn Fn(bool) -> bool| {
+        let chosen = all.iter().filter(|m| chosen(m.2)).map(|m| m.0);
+        let (sum, n) = chosen.fold((0.0, 0usize), |(sum, n), m| (sum + m, n + 1));
+        (sum / n.max(1) as f64, n)
+    };
+    let ((mean_px, n), (open_px, open)) = (mean(&|_| true), mean(&|open| open));
+    let open_px = if open as f64 >= LEAST_OPEN * n as f64 { open_px } else { mean_px };
+    Misses { mean_px, open_px, median_m: super::scan::median(&metres) }
 }

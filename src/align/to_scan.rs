@@ -35,8 +35,9 @@ const POINT_NOISE_M: f64 = 0.01;
 /// All sparse points together weigh at most as much as all edges.
 const POINTS_SHARE: f64 = 1.0;
 
-/// A scan whose outline misses the masks by more than this on average, pixels per 512 of picture width, is not of this
-/// vehicle, or not in metres: wrong headings miss by 2 and more, right ones by less than 1.
+/// A scan whose outline misses the masks by more than this on average, where they look out into the open, pixels per 512
+/// of picture width, is not of this vehicle, or not in metres: wrong headings miss by 2 and more, right ones by less
+/// than 1.
 const WORST_PX: f64 = 5.0;
 
 /// What to look at where no alignment fits.
@@ -109,10 +110,10 @@ pub fn to_scan(views: &[View], sparse: &[DVec3], scan: &Cloud, heading: Heading)
     both.sort_by(|a, b| a.1.mean_px.total_cmp(&b.1.mean_px));
     let [(best, misses), (other, other_misses)] = both;
     let worst = WORST_PX * f64::from(views[0].camera.width) / 512.0;
-    if !(misses.mean_px <= worst && misses.median_m.is_finite()) {
+    if !(misses.open_px <= worst && misses.median_m.is_finite()) {
         let reason = format!(
             "the scan's outline misses the masks' edges by {:.1} pixels on average, allowed: {worst:.1}",
-            misses.mean_px
+            misses.open_px
         );
         return Err(nowhere(&reason, CHECK));
     }
