@@ -27,8 +27,10 @@ fn main() -> Result<()> {
         let scene = sample::open(&INPUTS, prior == PriorChoice::Given)?;
         let name = if prior == PriorChoice::Hull { "hull" } else { "given" };
 
-        let twice =
-            Scene { views: scene.views.iter().flat_map(|v| [v.clone(), v.clone()]).collect(), cloud: None };
+        let twice = Scene {
+            views: scene.views.iter().flat_map(|v| [v.clone(), v.clone()]).collect(),
+            ..Scene::default()
+        };
         let keep = Keep { duplicate_views: true, ..Keep::default() };
         let what = format!("{name}, each view twice");
         row(
@@ -60,7 +62,7 @@ fn main() -> Result<()> {
             &[base(prior), keeping(prior, keep)],
         )?;
 
-        let narrow = Scene { views: scene.views[1..2].to_vec(), cloud: None };
+        let narrow = Scene { views: scene.views[1..2].to_vec(), ..Scene::default() };
         let keep = Keep { sh_bands: true, ..Keep::default() };
         let what = format!("{name}, view 001 alone");
         row("SH bands", &what, "too few to tell", &narrow, &unseen, &[base(prior), keeping(prior, keep)])?;

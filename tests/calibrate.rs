@@ -189,7 +189,7 @@ fn more_than_a_detectors_error_is_refused_and_reported() {
 fn silly_masks_give_finite_numbers_or_the_priors_own_error() {
     let base = || Scene {
         views: [-40.0, -140.0].map(|a| view(&format!("{a}"), camera(a, 6.5, 64, 48))).to_vec(),
-        cloud: None,
+        ..Scene::default()
     };
     let masks: [fn(u32, u32, Label) -> Label; 4] = [
         |_, _, _| Label::Vehicle,

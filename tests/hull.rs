@@ -5,15 +5,17 @@ mod common;
 use common::vehicle::{HALF, camera, right_side, view, without_depth};
 use std::ops::ControlFlow;
 use vg::pipeline::{Options, PriorChoice, Reconstruction, reconstruct};
+use vg::prior::volume::KnownBox;
 use vg::prior::{DepthPrior, Geometry, HullPrior};
 use vg::progress::{Context, Threads};
 use vg::scene::mask::Label;
-use vg::scene::{Mask, Scene, View};
+use vg::scene::{Mask, Place, Scene, VehicleBox, View};
 
 fn estimate(scene: &Scene, size: Option<[f64; 3]>) -> Geometry {
     let mut proceed = |_| ControlFlow::Continue(());
     let threads = Threads::new(2).unwrap();
-    HullPrior { size, ..HullPrior::default() }
+    let known_box = size.map(|size| KnownBox { size, center: None });
+    HullPrior { known_box, ..HullPrior::default() }
         .estimate(&scene.views, &Context::new(&threads, &mut proceed))
         .unwrap()
 }
@@ -47,7 +49,7 @@ fn every_mask_pixel_has_depth_near_the_surface() {
 #[test]
 fn the_estimated_box_holds_the_vehicle_and_little_more() {
     let scene = without_depth(right_side(320, 240));
-    let size = estimate(&scene, None).vehicle_box.unwrap().size();
+    let size = estimate(&scene, None).working_box.unwrap().size();
     for (k, size) in size.into_iter().enumerate() {
         let truth = 2.0 * HALF[k];
         assert!(size > truth - 0.05 && size < truth + 0.5, "axis {k}: {size} for {truth}");
@@ -57,7 +59,7 @@ fn the_estimated_box_holds_the_vehicle_and_little_more() {
 #[test]
 fn a_given_box_narrows_the_hull_and_is_reported_as_given() {
     // Two views of the flank bound the width loosely.
-    let scene = Scene { views: right_side(320, 240).views[1..3].to_vec(), cloud: None };
+    let scene = Scene { views: right_side(320, 240).views[1..3].to_vec(), ..Scene::default() };
     let mean = |geometry: &Geometry| -> f32 {
         let all: Vec<f32> = (0..2).flat_map(|i| excess(&scene, geometry, i)).map(f32::abs).collect();
         all.iter().sum::<f32>() / all.len() as f32
@@ -65,7 +67,80 @@ fn a_given_box_narrows_the_hull_and_is_reported_as_given() {
     let (tight, loose) = (estimate(&scene, Some([4.4, 1.8, 1.4])), estimate(&scene, None));
     assert!(mean(&tight) < mean(&loose) - 0.01, "{} against {}", mean(&tight), mean(&loose));
     let report = run(&without_depth(scene), Some([4.4, 1.8, 1.4])).report;
-    assert_eq!(serde_json::to_value(&report).unwrap()["box"]["source"], "given");
+    assert_eq!(serde_json::to_value(&report).unwrap()["working_box"]["source"], "given");
+}
+
+fn half(axis: usize) -> f64 {
+    f64::from(HALF[axis])
+}
+
+fn true_size() -> [f64; 3] {
+    std::array::from_fn(|k| 2.0 * half(k))
+}
+
+#[test]
+fn a_true_size_is_placed_by_the_silhouettes_and_takes_nothing_of_the_vehicle() {
+    let all = right_side(320, 240);
+    for kept in [vec![0], vec![1], vec![1, 2], vec![0, 3], vec![0, 1, 2, 3]] {
+        let views: Vec<View> = kept.iter().map(|&i| all.views[i].clone()).collect();
+        let scene = Scene { views, ..Scene::default() };
+        let known = estimate(&scene, Some(true_size())).working_box.unwrap();
+        assert_eq!(known.contradicted_m, 0.0, "{kept:?}");
+        for k in [0, 2] {
+            assert!(
+                known.low[k] <= -half(k) + 0.01 && known.high[k] >= half(k) - 0.01,
+                "{kept:?}: {known:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_size_of_another_vehicle_is_refused_and_one_that_is_a_little_off_is_told() {
+    let scene = without_depth(right_side(320, 240));
+    let made = |size: [f64; 3]| {
+        let options = Options { prior: PriorChoice::Hull, vehicle_size: Some(size), ..Options::default() };
+        reconstruct(&scene, &options, &mut |_| ControlFlow::Continue(()))
+    };
+    let [length, width, height] = true_size();
+    for wrong in [[width, length, height], [0.5 * length, width, height], [2.0 * length, width, height]] {
+        let error = made(wrong).unwrap_err().to_string();
+        assert!(error.starts_with("options.vehicle_size: ") && error.contains("nowhere"), "{error}");
+    }
+    let report = made([length - 0.4, width, height]).unwrap().report;
+    assert!(report.working_box.unwrap().contradicted_m > 0.1, "{:?}", report.working_box);
+    assert!(report.warnings().iter().any(|w| w.contains("contradict each other")), "{:?}", report.warnings());
+    assert!(made(true_size()).unwrap().report.warnings().is_empty());
+}
+
+#[test]
+fn a_box_that_stands_elsewhere_brings_its_plane_along_and_the_result_stays_in_the_cameras_frame() {
+    let scene = without_depth(right_side(160, 120));
+    let place = Place { center: [30.0, -12.0, 4.0], yaw: 2.1 };
+    let mut elsewhere = scene.clone();
+    for view in &mut elsewhere.views {
+        let pose = &mut view.camera.vehicle_from_camera;
+        *pose = place.vehicle_from_box().after(pose);
+    }
+    elsewhere.vehicle_box = Some(VehicleBox { size: true_size(), place: Some(place) });
+    let options = Options { prior: PriorChoice::Hull, vehicle_size: Some(true_size()), ..Options::default() };
+    let made = |scene: &Scene, options: &Options| {
+        reconstruct(scene, options, &mut |_| ControlFlow::Continue(())).unwrap()
+    };
+    let here = made(&scene, &options);
+    let there = made(&elsewhere, &Options { vehicle_size: None, ..options });
+    assert_eq!(here.gaussians.len(), there.gaussians.len());
+    for (here, there) in here.gaussians.means().iter().zip(there.gaussians.means()) {
+        let moved = place.vehicle_from_box().transform_point(glam::Vec3::from_array(*here).as_dvec3());
+        // Both are f32, some metres and some tens of metres from their origins.
+        assert!((moved - glam::Vec3::from_array(*there).as_dvec3()).length() < 2e-5);
+    }
+    let (a, b) = (here.report.input_error.unwrap(), there.report.input_error.unwrap());
+    assert!((a.psnr_db - b.psnr_db).abs() < 0.01 && (a.silhouette_iou - b.silhouette_iou).abs() < 1e-3);
+    let size = there.report.vehicle.unwrap();
+    for k in 0..3 {
+        assert!((size.size_m[k] - true_size()[k]).abs() < size.uncertainty_m[k], "{size:?}");
+    }
 }
 
 fn run(scene: &Scene, vehicle_size: Option<[f64; 3]>) -> Reconstruction {
@@ -95,11 +170,11 @@ fn cropped(view: &View, from: u32) -> View {
 #[test]
 fn a_mask_cut_by_the_border_carves_nothing_beyond_it() {
     let mut scene = without_depth(right_side(320, 240));
-    let whole = estimate(&scene, None).vehicle_box.unwrap();
+    let whole = estimate(&scene, None).working_box.unwrap();
     let [u0, _, u1, _] = scene.views[1].mask.as_ref().unwrap().bounds().unwrap();
     scene.views[1] = cropped(&scene.views[1], (u0 + u1) / 2);
     let cut = estimate(&scene, None);
-    let cut_box = cut.vehicle_box.unwrap();
+    let cut_box = cut.working_box.unwrap();
     for k in 0..3 {
         assert!(cut_box.size()[k] > whole.size()[k] - 0.1, "axis {k} lost: {cut_box:?} {whole:?}");
     }
@@ -117,8 +192,8 @@ fn a_mask_cut_by_the_border_carves_nothing_beyond_it() {
 
 #[test]
 fn one_side_view_alone_gets_a_plausible_width() {
-    let scene = Scene { views: vec![view("side", camera(-90.0, 6.5, 320, 240))], cloud: None };
-    let size = estimate(&without_depth(scene), None).vehicle_box.unwrap().size();
+    let scene = Scene { views: vec![view("side", camera(-90.0, 6.5, 320, 240))], ..Scene::default() };
+    let size = estimate(&without_depth(scene), None).working_box.unwrap().size();
     assert!(size[1] > 1.5 && size[1] < 2.6, "{size:?}");
 }
 

@@ -713,7 +713,7 @@ fn arguments() {
         mask: None,
         depth: None,
     };
-    let scene = |view: View| Scene { views: vec![view], cloud: None }.validate();
+    let scene = |view: View| Scene { views: vec![view], ..Scene::default() }.validate();
     scene(view()).unwrap();
     table.row("a scene without views", &["views: 0"], || Scene::default().validate());
     table.row("an image of another size", &["views[0] (v.png).image: 1x1"], || {

@@ -209,7 +209,7 @@ fn a_floating_pixel_between_two_surfaces_is_left_out() {
 fn views_from_one_direction_support_no_view_dependence() {
     let narrow = Scene {
         views: vec![view("a", camera(-90.0, 6.5, 160, 120)), view("b", camera(-93.0, 6.5, 160, 120))],
-        cloud: None,
+        ..Scene::default()
     };
     let made = run(&narrow, &Options::default());
     assert_eq!(made.gaussians.sh_degree(), 0);
@@ -220,8 +220,10 @@ fn views_from_one_direction_support_no_view_dependence() {
 #[test]
 fn where_both_sides_are_seen_nothing_is_cloned_but_what_is_missing() {
     let around = |a: &f64| view(&format!("{a}"), camera(*a, 6.5, 160, 120));
-    let scene =
-        Scene { views: [-140.0, -90.0, -40.0, 40.0, 90.0, 140.0].iter().map(around).collect(), cloud: None };
+    let scene = Scene {
+        views: [-140.0, -90.0, -40.0, 40.0, 90.0, 140.0].iter().map(around).collect(),
+        ..Scene::default()
+    };
     let both = run(&scene, &Options::default());
     let one = run(&right_side(160, 120), &Options::default());
     let share = |r: &Reconstruction| r.report.symmetry.cloned as f64 / r.report.gaussians as f64;
@@ -379,7 +381,7 @@ fn one_to_sixty_four_views_give_a_vehicle() {
     for n in [1, 2, 3, 8, 64] {
         let azimuth = |i: usize| -20.0 - 140.0 * (i as f64 + 0.5) / n as f64;
         let views = (0..n).map(|i| view(&i.to_string(), camera(azimuth(i), 6.5, 80, 60))).collect();
-        let scene = Scene { views, cloud: None };
+        let scene = Scene { views, ..Scene::default() };
         for prior in [PriorChoice::Given, PriorChoice::Hull] {
             let made = run(&scene, &Options { prior, ..Options::default() });
             assert!(made.report.gaussians > 500 && is_finite(&made), "{n} views, {prior:?}");
@@ -389,7 +391,7 @@ fn one_to_sixty_four_views_give_a_vehicle() {
 
 #[test]
 fn pictures_of_one_pixel_and_masks_of_one_pixel_do_not_break_it() {
-    let tiny = Scene { views: vec![view("tiny", camera(-90.0, 6.5, 1, 1))], cloud: None };
+    let tiny = Scene { views: vec![view("tiny", camera(-90.0, 6.5, 1, 1))], ..Scene::default() };
     for scene in [tiny.clone(), without_depth(tiny)] {
         match reconstruct(&scene, &Options::default(), &mut |_| ControlFlow::Continue(())) {
             Ok(made) => assert!(is_finite(&made)),
@@ -520,6 +522,7 @@ fn a_huge_budget_changes_no_byte_and_no_setting() {
     assert_eq!(made.report.left_out, free.report.left_out);
     let plan = made.report.plan.unwrap();
     assert!(plan.fits && plan.budget_s == 1e6 && plan.predicted_s > 0.0 && plan.machine.serial > 0.0);
+    assert!(plan.kept && plan.took_s > 0.0 && made.report.warnings().is_empty(), "{plan:?}");
     assert_eq!(free.report.plan, None);
 }
 
@@ -528,11 +531,17 @@ fn a_budget_that_cannot_be_kept_takes_the_cheapest_and_says_so() {
     for (scene, prior) in [
         (without_depth(right_side(160, 120)), "hull"),
         (right_side(160, 120), "given"),
-        (Scene { views: without_depth(right_side(160, 120)).views[1..2].to_vec(), cloud: None }, "hull"),
+        (
+            Scene { views: without_depth(right_side(160, 120)).views[1..2].to_vec(), ..Scene::default() },
+            "hull",
+        ),
     ] {
         let made = run(&scene, &Options { budget_s: Some(1e-6), ..Options::default() });
         let plan = made.report.plan.clone().unwrap();
         assert!(!plan.fits && plan.predicted_s > 1e-6, "{plan:?}");
+        assert!(!plan.kept && plan.took_s > 1e-6, "{plan:?}");
+        let warnings = made.report.warnings();
+        assert!(warnings.iter().any(|w| w.contains("was not kept") && w.contains("fastest")), "{warnings:?}");
         assert_eq!(made.report.prior, prior);
         assert!(plan.chosen.resolution <= 0.25 && !plan.chosen.check && made.report.input_error.is_none());
         assert_eq!(made.report.views_used.len(), 1);

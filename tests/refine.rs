@@ -80,7 +80,7 @@ fn a_view_held_out_tells_when_to_stop() {
     assert_eq!(view.view, scene.views[2].name);
     assert!(view.psnr_db[1] >= view.psnr_db[0], "{:?}", view.psnr_db);
     // Of two views none can be spared.
-    let two = Scene { views: scene.views[..2].to_vec(), cloud: None };
+    let two = Scene { views: scene.views[..2].to_vec(), ..Scene::default() };
     assert!(run(&two, &options(held)).report.refinement.unwrap().held_out.is_none());
 }
 

@@ -68,6 +68,24 @@ pub(crate) struct Moved {
     pub(crate) vehicle_from_corrected: Similarity,
 }
 
+impl Moved {
+    /// The same for views that were brought into the frame of a box that stands elsewhere: back means out of it.
+    pub(crate) fn out_of_box(moved: Option<Self>, in_box: &[View], vehicle_from_box: &Pose) -> Self {
+        let mut moved = moved.unwrap_or_else(|| Self {
+            views: in_box.to_vec(),
+            in_vehicle: in_box.to_vec(),
+            vehicle_from_corrected: Similarity::IDENTITY,
+        });
+        for view in &mut moved.in_vehicle {
+            view.camera.vehicle_from_camera = vehicle_from_box.after(&view.camera.vehicle_from_camera);
+        }
+        let Similarity { rotation, translation, scale } = moved.vehicle_from_corrected;
+        let Pose { rotation, translation } = vehicle_from_box.after(&Pose { rotation, translation });
+        moved.vehicle_from_corrected = Similarity { scale, rotation, translation };
+        moved
+    }
+}
+
 /// Cameras farther from the vehicle than this are not corrected, metres: f32 steps along their rays are no longer small
 /// against a pixel there.
 const FARTHEST_M: f64 = 1000.0;

@@ -10,8 +10,8 @@ use crate::error::{Error, Result};
 use crate::pipeline::{Calibrate, Keep, Options, PriorChoice};
 use crate::refine::{Amount, RefineOptions};
 use crate::relight::Relight;
-use crate::scene::Cloud;
 use crate::scene::cloud::MAX_CLOUD_POINTS;
+use crate::scene::{Cloud, Place};
 use crate::symmetry::SymmetryMode;
 use std::ffi::{CString, c_char, c_void};
 
@@ -124,7 +124,9 @@ pub struct vg_options {
     pub check: i32,
     /// 1: the report also holds the metric coloured point cloud; 0: it does not. Default 0.
     pub points: i32,
-    /// Length, width, height of the vehicle in metres, each 0.1 to 30; all 0: not known. Default 0, 0, 0.
+    /// Length, width, height of the vehicle in metres, each 0.1 to 30, to a few centimetres; all 0: not known. The
+    /// silhouettes tell where a box of this size stands, and no part of the vehicle is placed outside of it. Default 0, 0,
+    /// 0.
     pub vehicle_size: [f64; 3],
     /// NULL: none.
     pub progress: vg_progress_fn,
@@ -175,6 +177,18 @@ pub struct vg_options {
     pub refine_backend: i32,
     /// Must be 0.
     pub refine_flags: u32,
+    /// Centre of a box of `vehicle_size` in the frame of the cameras, metres, looked at where `has_vehicle_place` is 1. It
+    /// is believed to a few decimetres, as a tracked box is. Default 0, 0, 0.
+    pub vehicle_center: [f64; 3],
+    /// Turn of that box about z, from the frame's x axis to the vehicle's, radians, at most 2 pi either way. The box's
+    /// middle plane, not y = 0, is then the plane of symmetry; the result is in the frame of the cameras all the same.
+    /// Default 0.
+    pub vehicle_yaw: f64,
+    /// 1: the box stands at `vehicle_center`, turned by `vehicle_yaw`; 0: its place is not known. 1 needs a
+    /// `vehicle_size`. Default 0.
+    pub has_vehicle_place: i32,
+    /// Must be 0.
+    pub vehicle_flags: u32,
 }
 
 unsafe impl Versioned for vg_options {
@@ -212,6 +226,10 @@ unsafe impl Versioned for vg_options {
             refine_hold_out: 0,
             refine_backend: vg_backend::Auto as i32,
             refine_flags: 0,
+            vehicle_center: [0.0; 3],
+            vehicle_yaw: 0.0,
+            has_vehicle_place: 0,
+            vehicle_flags: 0,
         }
     }
 }
@@ -240,13 +258,16 @@ impl vg_options {
             (vg_relight::Never as i32, "never", Relight::Never),
         ];
         read::zero("options.flags", self.flags == 0)?;
+        read::zero("options.vehicle_flags", self.vehicle_flags == 0)?;
         let unknown_size = self.vehicle_size == [0.0; 3];
+        let placed = read::flag("options.has_vehicle_place", self.has_vehicle_place)?;
         Ok(Options {
             prior: read::choice("options.prior", self.prior, &priors)?,
             prior_model: unsafe { model::lent(self.prior_model) },
             head_model: unsafe { model::lent(self.head_model) },
             symmetry: read::choice("options.symmetry", self.symmetry, &symmetries)?,
             vehicle_size: (!unknown_size).then_some(self.vehicle_size),
+            vehicle_place: placed.then_some(Place { center: self.vehicle_center, yaw: self.vehicle_yaw }),
             sh_degree: sh_degree("options.sh_degree", self.sh_degree)?,
             keep: keep(self.keep)?,
             calibrate: read::choice("options.calibrate", self.calibrate, &calibrations)?,

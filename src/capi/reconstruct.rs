@@ -75,6 +75,9 @@ unsafe fn run(
 
 unsafe fn log(log: Log, report: &Report) {
     unsafe {
+        for warning in report.warnings() {
+            log.line(vg_log_level::Warning, || warning);
+        }
         for left in &report.left_out {
             log.line(vg_log_level::Info, || format!("left out {} {}: {}", left.count, left.what, left.why));
         }

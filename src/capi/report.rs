@@ -78,13 +78,14 @@ pub struct vg_report_figures {
     pub peak_rss_bytes: u64,
     /// 1 if the three fields that follow hold the error on the input views, 0 if the check was switched off.
     pub has_input_error: i32,
-    /// 1 if the prior worked in a box whose size follows below.
+    /// 1 if the prior looked for the vehicle in a box whose size follows below.
     pub has_box: i32,
     /// Mean PSNR over the used views, on white, full frame, dB.
     pub input_psnr_db: f64,
     /// Mean intersection over union of the model's silhouette and the masks.
     pub input_silhouette_iou: f64,
-    /// Length, width, height of the box, metres.
+    /// Length, width, height of the box that the prior looked for the vehicle in, metres: larger than the vehicle, whose own
+    /// size is `vehicle_size`.
     pub box_size: [f64; 3],
     /// Lowest corner of the Gaussians' centres, metres.
     pub extent_low: [f64; 3],
@@ -113,6 +114,15 @@ pub struct vg_report_figures {
     pub refine_iterations: u32,
     /// Steps that the result has seen; 0 if nothing was better than the beginning.
     pub refine_kept: u32,
+    /// Length, width, height of the vehicle, metres; outer mirrors are often missing from the width. 0, 0, 0 where
+    /// `has_vehicle_size` is 0.
+    pub vehicle_size: [f64; 3],
+    /// Their expected errors, metres.
+    pub vehicle_size_uncertainty: [f64; 3],
+    /// 1 if `vehicle_size` holds the vehicle's size.
+    pub has_vehicle_size: i32,
+    /// 1 if `vg_options.budget_s` was kept, or there was none; 0 if the call took longer.
+    pub budget_kept: i32,
 }
 
 unsafe impl Versioned for vg_report_figures {
@@ -148,6 +158,10 @@ unsafe impl Versioned for vg_report_figures {
             uncovered_after: 0.0,
             refine_iterations: 0,
             refine_kept: 0,
+            vehicle_size: [0.0; 3],
+            vehicle_size_uncertainty: [0.0; 3],
+            has_vehicle_size: 0,
+            budget_kept: 0,
         }
     }
 }
@@ -178,10 +192,10 @@ impl vg_report_figures {
             total_ms: report.total_ms,
             peak_rss_bytes: report.peak_rss_bytes.unwrap_or(0),
             has_input_error: i32::from(report.input_error.is_some()),
-            has_box: i32::from(report.vehicle_box.is_some()),
+            has_box: i32::from(report.working_box.is_some()),
             input_psnr_db: report.input_error.map_or(0.0, |e| e.psnr_db),
             input_silhouette_iou: report.input_error.map_or(0.0, |e| e.silhouette_iou),
-            box_size: report.vehicle_box.map_or([0.0; 3], |b| b.size_m),
+            box_size: report.working_box.map_or([0.0; 3], |b| b.size_m),
             extent_low: low.map(f64::from),
             extent_high: high.map(f64::from),
             relit_count: report.relight.map_or(0, |r| r.clones as u64),
@@ -195,6 +209,10 @@ impl vg_report_figures {
             uncovered_after: report.masks.map_or(0.0, |m| m.uncovered_after),
             refine_iterations: report.refinement.as_ref().map_or(0, |r| r.iterations),
             refine_kept: report.refinement.as_ref().map_or(0, |r| r.kept),
+            vehicle_size: report.vehicle.map_or([0.0; 3], |v| v.size_m),
+            vehicle_size_uncertainty: report.vehicle.map_or([0.0; 3], |v| v.uncertainty_m),
+            has_vehicle_size: i32::from(report.vehicle.is_some()),
+            budget_kept: i32::from(report.plan.as_ref().is_none_or(|plan| plan.kept)),
             ..Self::initial()
         }
     }

@@ -63,7 +63,7 @@ fn layout_of_rust() -> String {
             struct_size context prior symmetry sh_degree keep check points vehicle_size progress progress_user log
             log_user calibrate relight photo flags budget_s cloud cloud_count resolution
             max_views prior_model head_model refine_seconds refine_iterations refine_hold_out
-            refine_backend refine_flags
+            refine_backend refine_flags vehicle_center vehicle_yaw has_vehicle_place vehicle_flags
         }
         vg_picture_errors { struct_size psnr_db ssim lpips }
         vg_render_options {
@@ -75,7 +75,8 @@ fn layout_of_rust() -> String {
             struct_size gaussian_count mirrored_count views_used threads prior sh_degree total_ms peak_rss_bytes
             has_input_error has_box input_psnr_db input_silhouette_iou box_size extent_low extent_high relit_count
             cloud_used photo_found calibration has_uncovered calibration_yaw_degrees calibration_lateral_m
-            uncovered_before uncovered_after refine_iterations refine_kept
+            uncovered_before uncovered_after refine_iterations refine_kept vehicle_size vehicle_size_uncertainty
+            has_vehicle_size budget_kept
         }
         vg_scene_options {
             struct_size context vehicle_from_world names name_count depth_scale load_depth flags log log_user

@@ -60,7 +60,7 @@ pub(super) unsafe fn scene(views: *const vg_view, count: usize) -> Result<Scene>
     }
     let views = unsafe { read::array("views", views, count)? };
     let view = |(i, view): (usize, &vg_view)| unsafe { view_of(&format!("views[{i}]"), view) };
-    Ok(Scene { views: views.iter().enumerate().map(view).collect::<Result<_>>()?, cloud: None })
+    Ok(Scene { views: views.iter().enumerate().map(view).collect::<Result<_>>()?, ..Scene::default() })
 }
 
 /// One of them.

@@ -9,6 +9,7 @@ use super::scene::SceneFormat;
 use super::{colmap, image, json, realcar, transforms};
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
+use crate::scene::VehicleBox;
 use std::path::{Path, PathBuf};
 
 /// A scene's views in the world of its files.
@@ -22,6 +23,8 @@ pub(super) struct Listing {
     pub(super) not_vehicle_frame: Option<(&'static str, &'static str)>,
     /// The folder of a COLMAP model, which may have sparse points.
     pub(super) sparse_model: Option<PathBuf>,
+    /// The vehicle's box in the world of the poses.
+    pub(super) vehicle_box: Option<VehicleBox>,
 }
 
 /// One view of a [`Listing`].
@@ -111,7 +114,13 @@ fn list_transforms(path: &Path) -> Result<Listing> {
     let not_vehicle_frame = file.moved_by.map(|key| {
         (key, "not the identity: the poses were moved after they were measured, so that their world need not be the vehicle's frame. Pass the similarity from these poses to the vehicle's frame (--vehicle-from-world FILE), or drop the key if they are in it")
     });
-    Ok(Listing { source: path.to_owned(), views, not_vehicle_frame, sparse_model: None })
+    Ok(Listing {
+        source: path.to_owned(),
+        views,
+        not_vehicle_frame,
+        sparse_model: None,
+        vehicle_box: file.vehicle_box,
+    })
 }
 
 /// `model` is the model's folder, at or below `path`.
@@ -136,6 +145,7 @@ fn list_colmap(path: &Path, model: &Path) -> Result<Listing> {
         views: views.collect::<Result<_>>()?,
         not_vehicle_frame: Some(("vehicle_from_world", reason)),
         sparse_model: Some(model.to_owned()),
+        vehicle_box: None,
     })
 }
 

@@ -22,7 +22,7 @@ pub(super) fn load(views: &[SceneView]) -> Result<(Scene, Vec<String>)> {
         let unmasked = views.iter().filter(|v| v.mask.is_none());
         notes.extend(unmasked.map(|v| format!("{}: no mask, though other views have one", v.name)));
     }
-    let scene = Scene { views, cloud: None };
+    let scene = Scene { views, ..Scene::default() };
     scene.validate()?;
     Ok((scene, notes))
 }

@@ -1,11 +1,12 @@
 //! Opens a scene on disk: first a listing of names, cameras and files, then the pixels of the views asked for.
 
+use super::files::in_file;
 use super::listing::{self, Listing};
 use super::{colmap, load, select};
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, Similarity};
 use crate::io::ply::ColoredPoints;
-use crate::scene::Scene;
+use crate::scene::{Scene, VehicleBox};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 
@@ -50,6 +51,8 @@ pub struct SceneIndex {
     pub source: PathBuf,
     /// In the order asked for; else as in the `transforms.json`, or by name.
     pub views: Vec<SceneView>,
+    /// The vehicle's box in its own frame, where the scene file tells it.
+    pub vehicle_box: Option<VehicleBox>,
     sparse_model: Option<PathBuf>,
     vehicle_from_world: Option<Similarity>,
 }
@@ -96,7 +99,8 @@ pub fn list_scene(path: &Path, options: &SceneOptions) -> Result<SceneIndex> {
     {
         return Err(Error::argument("depth_scale", unit.to_string(), "metres per unit, above 0"));
     }
-    let Listing { source, mut views, not_vehicle_frame, sparse_model } = listing::list(path, options.format)?;
+    let Listing { source, mut views, not_vehicle_frame, sparse_model, vehicle_box } =
+        listing::list(path, options.format)?;
     if let (None, Some((field, reason))) = (&options.vehicle_from_world, not_vehicle_frame) {
         return Err(Error::format(&source, field, reason));
     }
@@ -113,8 +117,15 @@ pub fn list_scene(path: &Path, options: &SceneOptions) -> Result<SceneIndex> {
         let depth = depth.map(|d| DepthFile { unit: options.depth_scale.unwrap_or(d.unit), ..d });
         Ok(SceneView { name: view.name, camera, image: view.image, mask: view.mask, depth })
     });
+    let views = views.collect::<Result<_>>()?;
     let vehicle_from_world = options.vehicle_from_world;
-    Ok(SceneIndex { source, views: views.collect::<Result<_>>()?, sparse_model, vehicle_from_world })
+    let vehicle_box = match (vehicle_box, &vehicle_from_world) {
+        (Some(known), Some(moved)) => {
+            Some(known.moved("vehicle_box", moved).map_err(|e| in_file(&source, e))?)
+        }
+        (known, _) => known,
+    };
+    Ok(SceneIndex { source, views, vehicle_box, sparse_model, vehicle_from_world })
 }
 
 /// Lists the scene at `path` and reads the pictures, masks and depth maps of the views asked for.
@@ -142,7 +153,8 @@ impl SceneIndex {
 
     /// Reads the pixels of all views listed.
     pub fn load(self) -> Result<SceneFiles> {
-        let (scene, notes) = load::load(&self.views)?;
+        let (mut scene, notes) = load::load(&self.views)?;
+        scene.vehicle_box = self.vehicle_box;
         Ok(SceneFiles { index: self, scene, notes })
     }
 }

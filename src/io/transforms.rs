@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::geometry::camera::MAX_SIDE;
 use crate::geometry::frame::pose_from_opengl;
 use crate::geometry::{Camera, CameraModel, Distortion, Intrinsics, Pose};
+use crate::scene::{Place, VehicleBox};
 use serde::Deserialize;
 use serde::de::{SeqAccess, Visitor};
 use std::path::{Path, PathBuf};
@@ -19,6 +20,9 @@ pub struct Transforms {
     pub depth_unit: Option<f64>,
     /// The key that says that the poses were moved from where they were measured, if one does.
     pub moved_by: Option<&'static str>,
+    /// `vehicle_box`: `{"size": [length, width, height]}`, or with `"center": [x, y, z], "yaw": radians` in the world of
+    /// the poses.
+    pub vehicle_box: Option<VehicleBox>,
 }
 
 /// One picture.
@@ -87,6 +91,7 @@ with_lens! {
         depth_unit_scale_factor: Option<f64>,
         applied_transform: Option<Rows>,
         applied_scale: Option<f64>,
+        vehicle_box: Option<BoxJson>,
     } [w h fl_x fl_y cx cy camera_angle_x camera_angle_y k1 k2 k3 k4 k5 k6 p1 p2]
 }
 
@@ -97,6 +102,32 @@ with_lens! {
         depth_file_path: Option<String>,
         transform_matrix: Rows,
     } [w h fl_x fl_y cx cy camera_angle_x camera_angle_y k1 k2 k3 k4 k5 k6 p1 p2]
+}
+
+/// See [`Transforms::vehicle_box`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BoxJson {
+    size: [f64; 3],
+    center: Option<[f64; 3]>,
+    yaw: Option<f64>,
+}
+
+impl BoxJson {
+    fn checked(self, path: &Path) -> Result<VehicleBox> {
+        const FIELD: &str = "vehicle_box";
+        let place = match (self.center, self.yaw) {
+            (Some(center), yaw) => Some(Place { center, yaw: yaw.unwrap_or(0.0) }),
+            (None, None) => None,
+            (None, Some(_)) => {
+                let reason = "missing beside a yaw; allowed: x, y, z of the box's centre, metres";
+                return Err(Error::format(path, format!("{FIELD}.center"), reason));
+            }
+        };
+        let known = VehicleBox { size: self.size, place };
+        known.validate(FIELD).map_err(|e| in_file(path, e))?;
+        Ok(known)
+    }
 }
 
 /// The rows of a 3x4 matrix, or of a 4x4 one whose last row is 0 0 0 1.
@@ -158,7 +189,8 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Transforms> {
     } else {
         document.applied_scale.filter(|&s| s != 1.0).map(|_| "applied_scale")
     };
-    Ok(Transforms { frames, depth_unit: document.depth_unit_scale_factor, moved_by })
+    let vehicle_box = document.vehicle_box.map(|known| known.checked(path)).transpose()?;
+    Ok(Transforms { frames, depth_unit: document.depth_unit_scale_factor, moved_by, vehicle_box })
 }
 
 fn frame(json: &FrameJson, shared: &Lens, path: &Path, field: &str) -> Result<Frame> {
@@ -316,6 +348,27 @@ mod tests {
         assert_eq!(pose.translation.to_array(), [0.5, 2.0, -3.0]);
         assert_eq!(pose.rotation.z_axis.to_array(), [0.0, 0.0, -1.0]);
         assert_eq!(pose.rotation.y_axis.to_array(), [0.0, -1.0, 0.0]);
+    }
+
+    #[test]
+    fn a_vehicle_s_box_has_a_size_and_perhaps_a_place_and_nothing_else() {
+        let known = |text: &str| Ok(one(&format!(r#""fl_x": 1, "vehicle_box": {text},"#), "")?.vehicle_box);
+        let size = [4.4, 1.8, 1.5];
+        let only: Result<_> = known(r#"{"size": [4.4, 1.8, 1.5]}"#);
+        assert_eq!(only.unwrap(), Some(VehicleBox { size, place: None }));
+        let place = Place { center: [3.0, -2.0, 0.8], yaw: 0.5 };
+        let placed: Result<_> = known(r#"{"size": [4.4, 1.8, 1.5], "center": [3, -2, 0.8], "yaw": 0.5}"#);
+        assert_eq!(placed.unwrap(), Some(VehicleBox { size, place: Some(place) }));
+        for (bad, cause) in [
+            (r#"{"size": [4.4, 1.8]}"#, "vehicle_box"),
+            (r#"{"size": [4.4, 1.8, 1500]}"#, "vehicle_box.size"),
+            (r#"{"size": [4.4, 1.8, 1.5], "yaw": 1}"#, "vehicle_box.center"),
+            (r#"{"size": [4.4, 1.8, 1.5], "center": [0, 0, 0], "yaw": 90}"#, "radians"),
+            (r#"{"size": [4.4, 1.8, 1.5], "centre": [0, 0, 0]}"#, "centre"),
+        ] {
+            let error = known(bad).unwrap_err().to_string();
+            assert!(error.contains(cause), "{bad}: {error}");
+        }
     }
 
     #[test]

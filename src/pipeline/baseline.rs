@@ -6,6 +6,7 @@ use super::plan;
 use super::report::{Clock, Report, peak_rss_bytes};
 use super::run::{Reconstruction, chosen_views, undistorted};
 use crate::error::Result;
+use crate::prior::volume::KnownBox;
 use crate::progress::Context;
 use crate::refine::baseline::{self, BaselineOptions, Start};
 use crate::scene::Scene;
@@ -31,8 +32,9 @@ pub(super) fn reconstruct(
 
     context.report("start", 0.0)?;
     let cloud = scene.cloud.as_ref();
+    let known_box = options.vehicle_box(scene).map(|known| KnownBox::in_working_frame(&known, false));
     let Start { gaussians, filled, strays } =
-        context.parallel(|| Start::new(&views, cloud, options.vehicle_size, how))?;
+        context.parallel(|| Start::new(&views, cloud, known_box.as_ref(), how))?;
     plan::note(&mut left_out, "points", "in no picture", strays);
     clock.lap("start");
 
@@ -62,7 +64,8 @@ pub(super) fn reconstruct(
         extent_m: gaussians.bounds(),
         views_used: views.iter().map(|v| v.name.clone()).collect(),
         calibration: None,
-        vehicle_box: filled.map(Into::into),
+        vehicle: None,
+        working_box: filled.map(Into::into),
         cloud: None,
         photo: None,
         masks: None,

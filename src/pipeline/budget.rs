@@ -22,12 +22,32 @@ pub struct BudgetPlan {
     pub budget_s: f64,
     /// For what was chosen, from the start of the call, seconds.
     pub predicted_s: f64,
-    /// Whether that leaves enough room in the budget; if not, the cheapest was chosen.
+    /// Whether that leaves enough room in the budget; if not, the fastest settings were chosen.
     pub fits: bool,
+    /// What the call took, seconds, without an optimisation that was asked for in addition.
+    pub took_s: f64,
+    /// Whether that is within the budget.
+    pub kept: bool,
     /// How fast this machine was found to be.
     pub machine: Machine,
     /// What was chosen, the same as in the report's `settings`.
     pub chosen: Chosen,
+}
+
+impl BudgetPlan {
+    /// The plan after the run.
+    pub(super) fn after(self, took_s: f64) -> Self {
+        Self { took_s, kept: took_s <= self.budget_s, ..self }
+    }
+
+    /// What a caller should know whose budget was not kept.
+    pub fn warning(&self) -> Option<String> {
+        let Self { budget_s, predicted_s, took_s, .. } = self;
+        let settings = if self.fits { "the settings that were chosen" } else { "the fastest settings" };
+        (!self.kept).then(|| {
+            format!("the budget of {budget_s} s was not kept: {took_s:.2} s with {settings}, predicted {predicted_s:.2} s")
+        })
+    }
 }
 
 /// The options that a budget decides on.
@@ -83,6 +103,8 @@ pub(super) fn resolved(
         budget_s,
         predicted_s: spent + seconds,
         fits: fit.is_some(),
+        took_s: 0.0,
+        kept: true,
         machine,
         chosen: Chosen::of(&chosen),
     };

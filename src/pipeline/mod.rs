@@ -10,6 +10,7 @@ mod pixels;
 mod plan;
 pub mod report;
 pub mod run;
+mod size;
 mod spread;
 
 pub use budget::{BudgetPlan, Chosen};
@@ -17,3 +18,4 @@ pub use machine::Machine;
 pub use options::{Calibrate, Keep, Options, PriorChoice};
 pub use report::{InputError, LeftOut, Report, Stage};
 pub use run::{PointCloud, Reconstruction, reconstruct, reconstruct_on};
+pub use size::VehicleSize;

@@ -5,6 +5,7 @@ use crate::onnx::{self, Model};
 use crate::refine::RefineOptions;
 use crate::refine::baseline::BaselineOptions;
 use crate::relight::Relight;
+use crate::scene::{Place, Scene, VehicleBox};
 use crate::symmetry::SymmetryMode;
 use serde::{Deserialize, Serialize};
 
@@ -81,8 +82,12 @@ pub struct Options {
     pub symmetry: SymmetryMode,
     /// Whether clones are shown in the light of their own side.
     pub relight: Relight,
-    /// Length, width, height in metres, where known.
+    /// Length, width, height in metres, where known: no part of the vehicle is placed where no box of this size can
+    /// stand that fits the silhouettes. Goes before [`Scene::vehicle_box`](crate::scene::Scene::vehicle_box).
     pub vehicle_size: Option<[f64; 3]>,
+    /// Where a box of `vehicle_size` stands, to a few decimetres. Its middle plane, not y = 0, is then the plane of
+    /// symmetry; the result is in the frame of the cameras all the same.
+    pub vehicle_place: Option<Place>,
     /// Highest SH degree of the colour, 0 to 3.
     pub sh_degree: u8,
     /// What the plan may not leave out.
@@ -120,6 +125,7 @@ impl Default for Options {
             symmetry: SymmetryMode::Auto,
             relight: Relight::Auto,
             vehicle_size: None,
+            vehicle_place: None,
             sh_degree: 2,
             keep: Keep::default(),
             check: true,
@@ -157,15 +163,13 @@ impl Options {
                 return Err(Error::argument("options.prior_model", found, "none, or the prior onnx"));
             }
         }
-        if let Some(size) = self.vehicle_size {
-            const SIZE_M: std::ops::RangeInclusive<f64> = 0.1..=30.0;
-            if !size.iter().all(|s| SIZE_M.contains(s)) {
-                return Err(Error::argument(
-                    "options.vehicle_size",
-                    format!("{size:?}"),
-                    "length, width, height, each 0.1 to 30 m",
-                ));
+        match (self.vehicle_size, self.vehicle_place) {
+            (Some(size), place) => VehicleBox { size, place }.validate("options")?,
+            (None, Some(_)) => {
+                let allowed = "length, width, height in metres beside options.vehicle_place";
+                return Err(Error::argument("options.vehicle_size", "none", allowed));
             }
+            (None, None) => {}
         }
         if let Some(budget) = self.budget_s
             && !(budget > 0.0 && budget.is_finite())
@@ -190,6 +194,12 @@ impl Options {
             return Err(Error::argument("options.sh_degree", self.sh_degree.to_string(), "0 to 3"));
         }
         Ok(())
+    }
+
+    /// What is known of the vehicle's box: the caller's word, else the scene's.
+    pub(super) fn vehicle_box(&self, scene: &Scene) -> Option<VehicleBox> {
+        let own = self.vehicle_size.map(|size| VehicleBox { size, place: self.vehicle_place });
+        own.or(scene.vehicle_box)
     }
 
     /// What a baseline has not.

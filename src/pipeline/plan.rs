@@ -4,7 +4,8 @@ use super::options::{Keep, Options, PriorChoice};
 use super::report::LeftOut;
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
-use crate::prior::{Geometry, PointFit};
+use crate::prior::volume::known_box::TELLING_M;
+use crate::prior::{BoxSource, Geometry, PointFit, WorkingBox};
 use crate::scene::{Cloud, Scene, View};
 use glam::DVec3;
 
@@ -99,6 +100,19 @@ pub(super) fn sh_degree(
     let why = format!("the views span {spread:.0} degrees, too few to tell these bands apart");
     note(left_out, "SH bands", &why, usize::from(options.sh_degree - degree));
     degree
+}
+
+/// A size that the caller gave and the prior did not need.
+pub(super) fn note_size(left_out: &mut Vec<LeftOut>, is_known: bool, geometry: &Geometry) {
+    let why = match geometry.working_box {
+        Some(WorkingBox { source: BoxSource::Given, .. }) => return,
+        Some(WorkingBox { contradicted_m, .. }) if contradicted_m > 0.0 => {
+            format!("the silhouettes contradict it by {contradicted_m:.2} m")
+        }
+        Some(_) => format!("the silhouettes bound the vehicle as closely, to {TELLING_M} m"),
+        None => "the depth is given, not estimated".into(),
+    };
+    note(left_out, "vehicle size", &why, usize::from(is_known));
 }
 
 /// Points of the cloud that moved no surface.

@@ -2,8 +2,9 @@
 
 use super::budget::BudgetPlan;
 use super::options::Options;
+use super::size::VehicleSize;
 use crate::calibrate::Calibration;
-use crate::prior::{BoxSource, Filled, NetworkFit, PhotoFit, PointFit, VehicleBox};
+use crate::prior::{BoxSource, Filled, NetworkFit, PhotoFit, PointFit, WorkingBox};
 use crate::refine::Refinement;
 use crate::relight::Relighting;
 use crate::symmetry::Completion;
@@ -42,7 +43,7 @@ pub struct InputError {
     pub mask_covered: f64,
 }
 
-/// The box the prior worked in.
+/// The box the prior looked for the vehicle in.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BoxReport {
     /// `given` or `estimated`.
@@ -51,11 +52,13 @@ pub struct BoxReport {
     pub size_m: [f64; 3],
     /// Lowest corner, metres.
     pub low_m: [f64; 3],
+    /// By how much the size that the caller gave and the silhouettes contradict each other, metres; 0 where they agree.
+    pub contradicted_m: f64,
 }
 
-impl From<VehicleBox> for BoxReport {
-    fn from(b: VehicleBox) -> Self {
-        Self { source: b.source, size_m: b.size(), low_m: b.low }
+impl From<WorkingBox> for BoxReport {
+    fn from(b: WorkingBox) -> Self {
+        Self { source: b.source, size_m: b.size(), low_m: b.low, contradicted_m: b.contradicted_m }
     }
 }
 
@@ -86,10 +89,11 @@ pub struct Report {
     pub views_used: Vec<String>,
     /// How the cameras were corrected; `None` if that was switched off or these views cannot be calibrated.
     pub calibration: Option<Calibration>,
-    /// The box the prior worked in, in the corrected frame: its sides are parallel to the plane of symmetry. The box
-    /// a baseline's first Gaussians were drawn from.
-    #[serde(rename = "box")]
-    pub vehicle_box: Option<BoxReport>,
+    /// How long, wide and high the vehicle is; `None` for a baseline.
+    pub vehicle: Option<VehicleSize>,
+    /// The box the prior looked for the vehicle in, which is larger, in the corrected frame: its sides are parallel to the
+    /// plane of symmetry. The box a baseline's first Gaussians were drawn from.
+    pub working_box: Option<BoxReport>,
     /// What the prior made of the scene's cloud.
     pub cloud: Option<PointFit>,
     /// What the photographs said of the prior's surface, where they were asked.
@@ -113,6 +117,31 @@ pub struct Report {
     /// The options of the call; where it had a budget, those that were chosen: with them and without a budget another
     /// call does the same.
     pub settings: Options,
+}
+
+/// A size that is contradicted by less is within what masks and poses are off by, metres.
+const CONTRADICTION_TOLD_M: f64 = 0.05;
+
+impl Report {
+    /// What a caller should know of a run that went well, one sentence each: it looks like a mistake in the input, or is
+    /// not what was asked for.
+    pub fn warnings(&self) -> Vec<String> {
+        let network = self.network.iter().flat_map(|network| network.warnings.iter().cloned());
+        let budget = self.plan.as_ref().and_then(BudgetPlan::warning);
+        let contradicted = self.working_box.filter(|b| b.contradicted_m > CONTRADICTION_TOLD_M);
+        let size = contradicted.map(|b| {
+            let use_made = match b.source {
+                BoxSource::Given => "it was used all the same",
+                BoxSource::Estimated => "it was not used",
+            };
+            format!(
+                "the vehicle's size that was given and the silhouettes contradict each other by {:.2} m: {use_made}; check the \
+                 size (length, width, height), the masks and the poses",
+                b.contradicted_m
+            )
+        });
+        network.chain(budget).chain(size).collect()
+    }
 }
 
 /// Times the stages.

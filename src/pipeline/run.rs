@@ -4,20 +4,23 @@ use super::check::input_error;
 use super::options::{Calibrate, Options, PriorChoice};
 use super::pixels::{self, BETTER};
 use super::report::{Clock, LeftOut, Report, peak_rss_bytes};
+use super::size::VehicleSize;
 use super::spread::spread;
 use super::{baseline, budget, cost, plan};
 use crate::calibrate::{self, Calibrated, Moved};
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
+use crate::geometry::frame::pose_from_box;
 use crate::geometry::{Camera, Similarity};
 use crate::head::surfel::FOOTPRINT_SIGMA_PX;
 use crate::head::{GaussianHead, NetworkHead, SurfelHead};
+use crate::prior::volume::KnownBox;
 use crate::prior::{DepthPrior, Geometry, GivenDepth, HullPrior, NetworkPrior, ShapePrior};
 use crate::progress::{Context, ProgressCallback, Threads};
 use crate::refine::{self, tie::Clone as Tied};
 use crate::relight::{Light, Relight, Relighting};
 use crate::scene::visibility::{Observer, SURFACE_M, Sight};
-use crate::scene::{Cloud, Scene, View, mirror, resize, undistort};
+use crate::scene::{Cloud, Place, Scene, View, mirror, resize, undistort};
 use crate::symmetry::{self, Completion, MirroredPlace, SymmetryMode};
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
@@ -86,6 +89,13 @@ pub fn reconstruct_on<'a>(
 
     context.report("undistort", 0.0)?;
     let views = undistorted(scene, &used, options, &mut left_out, &context)?;
+    let known_box = options.vehicle_box(scene);
+    // A box that stands beside y = 0 brings its own plane of symmetry along.
+    let beside = known_box.and_then(|known| known.place).filter(|place| !place.is_on_the_plane());
+    let (views, vehicle_from_box) = match beside {
+        Some(place) => (in_frame_of_box(views, &place), Some(place.vehicle_from_box())),
+        None => (views, None),
+    };
     clock.lap("undistort");
 
     context.report("calibrate", 0.0)?;
@@ -94,6 +104,10 @@ pub fn reconstruct_on<'a>(
         Calibrate::Off => Calibrated::default(),
     };
     plan::note(&mut left_out, "calibration", why.unwrap_or_default(), usize::from(why.is_some()));
+    let moved = match vehicle_from_box {
+        Some(vehicle_from_box) => Some(Moved::out_of_box(moved, &views, &vehicle_from_box)),
+        None => moved,
+    };
     // From here to the symmetry all is in the frame whose y = 0 is the plane that was found.
     let seen = moved.as_ref().map_or(views, |moved| moved.views.clone());
     let views = match options.symmetry {
@@ -108,9 +122,11 @@ pub fn reconstruct_on<'a>(
         None => cloud.clone(),
     });
     let source = plan::prior(options.prior, views.iter().all(|v| v.depth.is_some()));
-    let prior = chosen_prior(source, cloud, options)?;
+    let placed = known_box.map(|known| KnownBox::in_working_frame(&known, beside.is_some()));
+    let prior = chosen_prior(source, cloud, placed, options)?;
     let mut geometry = prior.estimate(&views, &context)?;
     geometry.find_normals(&views, &context);
+    plan::note_size(&mut left_out, known_box.is_some(), &geometry);
     if let Some(cloud) = &scene.cloud {
         plan::note_cloud(&mut left_out, cloud, geometry.points);
     }
@@ -150,6 +166,7 @@ pub fn reconstruct_on<'a>(
         None => (gaussians, None),
     };
     clock.lap("refine");
+    let vehicle = VehicleSize::measured(&gaussians, &geometry);
     let (gaussians, points, views) = match &moved {
         Some(moved) => back_in_vehicle(&gaussians, points, moved, &context)?,
         None => (gaussians, points, seen),
@@ -162,6 +179,8 @@ pub fn reconstruct_on<'a>(
     clock.lap("check");
 
     let (stages, total_ms) = clock.finish();
+    let refine_ms: f64 = stages.iter().filter(|stage| stage.name == "refine").map(|stage| stage.ms).sum();
+    let budget = budget.map(|plan| plan.after(1e-3 * (total_ms - refine_ms)));
     let report = Report {
         version: env!("CARGO_PKG_VERSION"),
         prior: prior.name(),
@@ -175,7 +194,8 @@ pub fn reconstruct_on<'a>(
         extent_m: gaussians.bounds(),
         views_used: views.iter().map(|v| v.name.clone()).collect(),
         calibration,
-        vehicle_box: geometry.vehicle_box.map(Into::into),
+        vehicle,
+        working_box: geometry.working_box.map(Into::into),
         cloud: geometry.points,
         photo: geometry.photo,
         masks: geometry.masks,
@@ -233,8 +253,22 @@ pub(super) fn undistorted(
     Ok(views)
 }
 
-fn chosen_prior(choice: PriorChoice, cloud: Option<Cloud>, options: &Options) -> Result<Box<dyn DepthPrior>> {
-    let size = options.vehicle_size;
+/// The views of cameras in the box's own frame.
+fn in_frame_of_box(mut views: Vec<View>, place: &Place) -> Vec<View> {
+    let vehicle_from_box = place.vehicle_from_box();
+    for view in &mut views {
+        let pose = &mut view.camera.vehicle_from_camera;
+        *pose = pose_from_box(&vehicle_from_box, pose);
+    }
+    views
+}
+
+fn chosen_prior(
+    choice: PriorChoice,
+    cloud: Option<Cloud>,
+    known_box: Option<KnownBox>,
+    options: &Options,
+) -> Result<Box<dyn DepthPrior>> {
     let voxel_m = cost::voxel_m(options.resolution);
     Ok(match choice {
         PriorChoice::Onnx => {
@@ -242,9 +276,9 @@ fn chosen_prior(choice: PriorChoice, cloud: Option<Cloud>, options: &Options) ->
             Box::new(NetworkPrior::new(model)?)
         }
         PriorChoice::Given => Box::new(GivenDepth),
-        PriorChoice::Hull => Box::new(HullPrior { size, cloud, voxel_m }),
+        PriorChoice::Hull => Box::new(HullPrior { known_box, cloud, voxel_m }),
         PriorChoice::Shape | PriorChoice::Auto => {
-            Box::new(ShapePrior { size, cloud, photo: options.photo, voxel_m })
+            Box::new(ShapePrior { known_box, cloud, photo: options.photo, voxel_m })
         }
     })
 }

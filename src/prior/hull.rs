@@ -11,9 +11,9 @@
 //! vehicle pixels pass it by, so that every mask is filled. Measured points, where there are some, pull it to them.
 
 use super::volume::{
-    Field, Silhouette, estimate_box, fill_masks, fit_cloud, inside_all, inside_box, march, place_box,
+    Field, KnownBox, Silhouette, fill_masks, find_box, fit_cloud, inside_all, inside_box, march,
 };
-use super::{DepthPrior, Geometry, VehicleBox};
+use super::{DepthPrior, Ends, Geometry, WorkingBox};
 use crate::error::{Error, Result};
 use crate::progress::Context;
 use crate::scene::{Cloud, View};
@@ -33,11 +33,14 @@ const SMOOTHING_M: f32 = 0.05;
 /// 0.03 to 0.05 gain most on the unseen side, see docs/SHAPE.md.
 const INSET_M: f32 = 0.05;
 
+/// What the hull's ends are off by, metres: a little more than its surface on average, see docs/SHAPE.md.
+const END_ERROR_M: f64 = 0.1;
+
 /// See the module's documentation.
 #[derive(Clone, Debug, Default)]
 pub struct HullPrior {
-    /// Length, width, height in metres, where the caller knows them.
-    pub size: Option<[f64; 3]>,
+    /// The vehicle's box, as far as the caller knows it.
+    pub known_box: Option<KnownBox>,
     /// Points measured on the vehicle, where there are some.
     pub cloud: Option<Cloud>,
     /// Grid spacing, metres, where a coarser one than the finest useful one will do.
@@ -50,13 +53,13 @@ impl DepthPrior for HullPrior {
     }
 
     fn estimate(&self, views: &[View], context: &Context) -> Result<Geometry> {
-        self.require_masks(views)?;
+        require_masks(views)?;
         let silhouettes: Vec<Silhouette> =
             context.parallel(|| views.par_iter().map(Silhouette::new).collect());
         context.report("prior", 0.15)?;
-        let vehicle_box = context.parallel(|| self.find_box(views, &silhouettes))?;
+        let working_box = context.parallel(|| find_box(self.known_box.as_ref(), views, &silhouettes))?;
         context.report("prior", 0.3)?;
-        let hull = context.parallel(|| carve(&silhouettes, &vehicle_box, self.voxel_m));
+        let hull = context.parallel(|| carve(&silhouettes, &working_box, self.voxel_m));
         context.report("prior", 0.5)?;
         let mut field = hull.clone();
         let masks = context.parallel(|| {
@@ -72,44 +75,37 @@ impl DepthPrior for HullPrior {
             depths.push(context.parallel(|| march::march(view, &field))?);
             context.report("prior", 0.6 + 0.4 * (i + 1) as f64 / views.len() as f64)?;
         }
-        Ok(Geometry { points, masks: Some(masks), ..Geometry::new(depths, Some(vehicle_box)) })
+        let ends = context.parallel(|| Ends::of_field(&field, |_| END_ERROR_M));
+        Ok(Geometry { points, ends, masks: Some(masks), ..Geometry::new(depths, Some(working_box)) })
     }
 }
 
-impl HullPrior {
-    /// An error for a view without silhouette.
-    pub(super) fn require_masks(&self, views: &[View]) -> Result<()> {
-        for (i, view) in views.iter().enumerate() {
-            if view.mask.as_ref().is_none_or(|m| m.vehicle_pixels() == 0) {
-                return Err(Error::argument(
-                    format!("{}.mask", view.argument(i)),
-                    if view.mask.is_some() { "no vehicle pixel" } else { "none" },
-                    "a mask with the vehicle, the caller's own or a segmentation network's (mask model): without depth there is nothing but silhouettes",
-                ));
-            }
+/// An error for a view without silhouette.
+pub(super) fn require_masks(views: &[View]) -> Result<()> {
+    for (i, view) in views.iter().enumerate() {
+        if view.mask.as_ref().is_none_or(|m| m.vehicle_pixels() == 0) {
+            return Err(Error::argument(
+                format!("{}.mask", view.argument(i)),
+                if view.mask.is_some() { "no vehicle pixel" } else { "none" },
+                "a mask with the vehicle, the caller's own or a segmentation network's (mask model): without depth there is nothing but silhouettes",
+            ));
         }
-        Ok(())
     }
-
-    /// The vehicle's box, of the size that the caller gave, if so.
-    pub(super) fn find_box(&self, views: &[View], silhouettes: &[Silhouette]) -> Result<VehicleBox> {
-        let estimated = estimate_box(views, |p| inside_all(silhouettes, p))?;
-        Ok(self.size.map_or(estimated, |size| place_box(size, &estimated)))
-    }
+    Ok(())
 }
 
 /// Grid spacing for a vehicle of this size, metres, but no finer than `coarser`.
-pub(super) fn voxel(vehicle_box: &VehicleBox, coarser: Option<f64>) -> f64 {
-    let longest = vehicle_box.size().into_iter().fold(0.0, f64::max);
+pub(super) fn voxel(working_box: &WorkingBox, coarser: Option<f64>) -> f64 {
+    let longest = working_box.size().into_iter().fold(0.0, f64::max);
     (longest / MOST_POINTS).max(coarser.unwrap_or(FINEST_VOXEL_M)).max(FINEST_VOXEL_M)
 }
 
 /// The hull in its box, with a margin so that the surface lies inside the grid.
-fn carve(silhouettes: &[Silhouette], vehicle_box: &VehicleBox, coarser: Option<f64>) -> Field {
-    let (low, high) = (glam::DVec3::from_array(vehicle_box.low), glam::DVec3::from_array(vehicle_box.high));
-    let voxel = voxel(vehicle_box, coarser);
+fn carve(silhouettes: &[Silhouette], working_box: &WorkingBox, coarser: Option<f64>) -> Field {
+    let (low, high) = (glam::DVec3::from_array(working_box.low), glam::DVec3::from_array(working_box.high));
+    let voxel = voxel(working_box, coarser);
     let margin = glam::DVec3::splat(2.0 * voxel);
     Field::carve(low - margin, high + margin, voxel, |p| {
-        inside_all(silhouettes, p).min(inside_box(vehicle_box, p))
+        inside_all(silhouettes, p).min(inside_box(working_box, p))
     })
 }

@@ -40,7 +40,9 @@ pub struct Geometry {
     /// [`Geometry::find_normals`].
     pub normals: Vec<Vec<Vec3>>,
     /// The box it worked in.
-    pub vehicle_box: Option<VehicleBox>,
+    pub working_box: Option<WorkingBox>,
+    /// Where its surface ends, if it estimates a whole one.
+    pub ends: Option<Ends>,
     /// What it made of the scene's cloud, where there is one and it has a use for it.
     pub points: Option<PointFit>,
     /// What the photographs said of the surface, where they were asked.
@@ -53,11 +55,12 @@ pub struct Geometry {
 
 impl Geometry {
     /// Depth without normals yet.
-    pub fn new(depths: Vec<DepthMap>, vehicle_box: Option<VehicleBox>) -> Self {
+    pub fn new(depths: Vec<DepthMap>, working_box: Option<WorkingBox>) -> Self {
         Self {
             depths,
             normals: Vec::new(),
-            vehicle_box,
+            working_box,
+            ends: None,
             points: None,
             photo: None,
             masks: None,
@@ -95,28 +98,54 @@ impl Geometry {
     }
 }
 
-/// An axis-aligned box in the vehicle frame, symmetric about y = 0.
+/// Where a surface begins and ends along each axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct VehicleBox {
+pub struct Ends {
+    /// Lowest x, y, z, metres.
+    pub low: [f64; 3],
+    /// Highest x, y, z, metres.
+    pub high: [f64; 3],
+    /// Expected error of both, metres. `[axis][low, high]`
+    pub error_m: [[f64; 2]; 3],
+}
+
+impl Ends {
+    /// The ends of a field's zero surface, which is expected to be off by `error_m` at a point.
+    pub(crate) fn of_field(field: &volume::Field, error_m: impl Fn(Vec3) -> f64) -> Option<Self> {
+        let ends = field.surface_ends()?;
+        Some(Self {
+            low: ends.map(|[(low, _), _]| f64::from(low)),
+            high: ends.map(|[_, (high, _)]| f64::from(high)),
+            error_m: ends.map(|both| both.map(|(_, at)| error_m(at))),
+        })
+    }
+}
+
+/// The box that a prior looks for the vehicle in: axis-aligned in the vehicle frame, symmetric about y = 0, and larger
+/// than the vehicle by what the silhouettes leave open.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WorkingBox {
     /// Lowest corner, metres.
     pub low: [f64; 3],
     /// Highest corner, metres.
     pub high: [f64; 3],
-    /// Who said so.
+    /// What bounds it.
     pub source: BoxSource,
+    /// By how much the known size and the silhouettes contradict each other, metres; 0 where they agree.
+    pub contradicted_m: f64,
 }
 
-/// Where a [`VehicleBox`] comes from.
+/// Where a [`WorkingBox`] comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BoxSource {
-    /// The caller.
+    /// The size that the caller gave, and the silhouettes.
     Given,
-    /// The silhouettes.
+    /// The silhouettes alone.
     Estimated,
 }
 
-impl VehicleBox {
+impl WorkingBox {
     /// Length, width, height in metres.
     pub fn size(&self) -> [f64; 3] {
         std::array::from_fn(|k| self.high[k] - self.low[k])

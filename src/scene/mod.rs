@@ -10,6 +10,7 @@ pub(crate) mod mirror;
 pub(crate) mod resize;
 pub mod segment;
 pub mod undistort;
+pub mod vehicle_box;
 pub mod view;
 pub mod visibility;
 
@@ -18,4 +19,5 @@ pub use depth::DepthMap;
 pub use image::{PixelFormat, RgbImage};
 pub use mask::Mask;
 pub use segment::Segmenter;
+pub use vehicle_box::{Place, VehicleBox};
 pub use view::{Scene, View};

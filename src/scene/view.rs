@@ -1,6 +1,6 @@
 //! A view and a scene, and what makes them valid.
 
-use super::{Cloud, DepthMap, Mask, RgbImage};
+use super::{Cloud, DepthMap, Mask, RgbImage, VehicleBox};
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use glam::{DVec3, Vec3};
@@ -30,6 +30,8 @@ pub struct Scene {
     pub views: Vec<View>,
     /// Points on the vehicle, where some were measured; priors that estimate the surface move it there.
     pub cloud: Option<Cloud>,
+    /// The vehicle's box, where one was tracked or measured; [`crate::pipeline::Options::vehicle_size`] goes before it.
+    pub vehicle_box: Option<VehicleBox>,
 }
 
 impl View {
@@ -90,6 +92,7 @@ impl Scene {
         if self.views.is_empty() || self.views.len() > MAX_VIEWS {
             return Err(Error::argument("views", self.views.len().to_string(), format!("1 to {MAX_VIEWS}")));
         }
-        self.views.iter().enumerate().try_for_each(|(i, view)| view.validate(&view.argument(i)))
+        self.views.iter().enumerate().try_for_each(|(i, view)| view.validate(&view.argument(i)))?;
+        self.vehicle_box.map_or(Ok(()), |known| known.validate("vehicle_box"))
     }
 }

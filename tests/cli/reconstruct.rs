@@ -88,11 +88,11 @@ fn points_are_the_metric_cloud_of_the_used_views_and_keep_changes_the_model() {
 fn options_reach_the_library() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let options = "--prior hull --symmetry never --box 4.7,1.95,1.5 --sh-degree 0 --threads 1";
-    succeed(at, &format!("reconstruct . --views 000,002 {options} -o {{}}/a.ply --report {{}}/r.json"));
+    let options = "--prior hull --symmetry never --box 4.65,1.9,1.45,0,0,0,0 --sh-degree 0 --threads 1";
+    succeed(at, &format!("reconstruct . --views 002 {options} -o {{}}/a.ply --report {{}}/r.json"));
     let report = json(&at.join("r.json"));
     assert_eq!(report["symmetry"]["mode"], "never");
-    assert_eq!(report["box"]["source"], "given");
+    assert_eq!(report["working_box"]["source"], "given");
     assert_eq!((report["sh_degree"].as_u64(), report["threads"].as_u64()), (Some(0), Some(1)));
 }
 

@@ -50,7 +50,7 @@ pub fn right_side(width: u32, height: u32) -> Scene {
     let views = [-40.0, -75.0, -105.0, -140.0];
     Scene {
         views: views.iter().map(|a| view(&format!("{a}"), camera(*a, 6.5, width, height))).collect(),
-        cloud: None,
+        ..Scene::default()
     }
 }
 

@@ -313,7 +313,7 @@ fn pixels() -> Vec<Input> {
 fn views() -> Vec<Input> {
     fn of(azimuths: &[f64], keep: Keep) -> Result<String> {
         let views = azimuths.iter().map(|a| view(&format!("{a}"), camera(*a, 6.5, 48, 36))).collect();
-        summed_up(&run(&Scene { views, cloud: None }, &Options { keep, ..options() })?)
+        summed_up(&run(&Scene { views, ..Scene::default() }, &Options { keep, ..options() })?)
     }
     let call = "reconstruct";
     vec![

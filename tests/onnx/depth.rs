@@ -96,7 +96,7 @@ fn depth_is_exact_in_every_convention() {
 fn pictures_are_scaled_and_cut_with_their_intrinsics_and_depth_comes_back_to_their_pixels() {
     // So near that the vehicle fills the picture's width.
     let views = [-80.0, -100.0].map(|a| view(&format!("{a}"), camera(a, 4.2, 128, 72)));
-    let scene = Scene { views: views.into(), cloud: None };
+    let scene = Scene { views: views.into(), ..Scene::default() };
     for (resize, cut) in [("cover_crop", true), ("stretch", false)] {
         // Of another aspect than the photographs.
         let mut graph = ellipsoid(&scene.views[0].camera, 88, 66, Manner::PLAIN);
@@ -213,7 +213,7 @@ fn poses_of_other_pictures_are_told_and_rays_of_another_lens_refused() {
 
 #[test]
 fn a_network_without_metres_needs_two_places() {
-    let one = Scene { views: vec![view("one", camera(-90.0, 6.5, WIDTH, HEIGHT))], cloud: None };
+    let one = Scene { views: vec![view("one", camera(-90.0, 6.5, WIDTH, HEIGHT))], ..Scene::default() };
     let manner = Manner { is_metric: false, ..Manner::PLAIN };
     let graph = ellipsoid(&one.views[0].camera, WIDTH.into(), HEIGHT.into(), manner);
     let Some(model) = open("one", &graph) else { return };

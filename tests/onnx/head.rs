@@ -140,7 +140,7 @@ fn fixture() -> Fixture {
             depth: Some(DepthMap::new(width, height, depth[w * h * i..w * h * (i + 1)].to_vec()).unwrap()),
         }
     };
-    let scene = Scene { views: (0..n).map(view).collect(), cloud: None };
+    let scene = Scene { views: (0..n).map(view).collect(), ..Scene::default() };
     Fixture { scene, every, gaussians: gaussians.as_chunks::<38>().0.to_vec() }
 }
 

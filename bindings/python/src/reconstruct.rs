@@ -192,7 +192,7 @@ fn scene_of(
         let name = names.as_ref().map_or_else(|| format!("{i:03}"), |names| names[i].clone());
         Ok(View { name, camera, image, mask, depth })
     });
-    Ok(Scene { views: views.collect::<PyResult<_>>()?, cloud: None })
+    Ok(Scene { views: views.collect::<PyResult<_>>()?, ..Scene::default() })
 }
 
 /// The picture, and the mask its alpha channel makes if it is transparent somewhere.

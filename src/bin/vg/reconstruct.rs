@@ -6,7 +6,7 @@ use crate::shown::Bar;
 use crate::{cloud, files, scene, shown};
 use vg::io::ply;
 use vg::onnx::Model;
-use vg::pipeline::{self, BudgetPlan, Options, Reconstruction, Report};
+use vg::pipeline::{self, Options, Reconstruction, Report};
 use vg::progress::Threads;
 use vg::scene::Segmenter;
 use vg::{Scene, View, io};
@@ -51,12 +51,8 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
 
 /// What a user should hear of a reconstruction that went well.
 pub(crate) fn note_warnings(report: &Report) {
-    for warning in report.network.iter().flat_map(|network| &network.warnings) {
-        note(warning);
-    }
-    if let Some(plan) = report.plan.as_ref().filter(|plan| !plan.fits) {
-        let BudgetPlan { budget_s, predicted_s, .. } = plan;
-        note(&format!("the budget of {budget_s} s cannot be kept: the least takes about {predicted_s:.2} s"));
+    for warning in report.warnings() {
+        note(&warning);
     }
 }
 
@@ -84,7 +80,7 @@ pub(crate) fn reconstruct(scene: &Scene, options: &Options) -> Result<Reconstruc
 /// One line.
 pub(crate) fn summary(made: &Reconstruction) -> String {
     let report = &made.report;
-    let extent = report.extent_m.as_ref().map_or_else(String::new, |e| format!("{}, ", shown::extent(e)));
+    let size = report.vehicle.map_or_else(String::new, |v| format!("{}, ", shown::size(&v)));
     let check = report.input_error.map_or_else(String::new, |e| {
         format!(
             "; on these views PSNR {:.2} dB, silhouette IoU {:.3}, at least {:.1} % of each mask covered",
@@ -94,7 +90,7 @@ pub(crate) fn summary(made: &Reconstruction) -> String {
         )
     });
     format!(
-        "{} Gaussians, {extent}SH degree {}, prior {}, {} views, {:.2} s{check}",
+        "{} Gaussians, {size}SH degree {}, prior {}, {} views, {:.2} s{check}",
         shown::count(report.gaussians),
         report.sh_degree,
         report.prior,

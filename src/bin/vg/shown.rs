@@ -94,3 +94,10 @@ pub(crate) fn extent((low, high): &([f32; 3], [f32; 3])) -> String {
     let [x, y, z]: [f32; 3] = std::array::from_fn(|k| high[k] - low[k]);
     format!("{x:.2} x {y:.2} x {z:.2} m")
 }
+
+/// Length, width and height with their uncertainty, where it is the same for all to a centimetre once.
+pub(crate) fn size(vehicle: &vg::pipeline::VehicleSize) -> String {
+    let [l, w, h] = vehicle.size_m;
+    let worst = vehicle.uncertainty_m.into_iter().fold(0.0, f64::max);
+    format!("{l:.2} x {w:.2} x {h:.2} m (± {worst:.2})")
+}

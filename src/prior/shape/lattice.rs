@@ -4,7 +4,7 @@
 //! The lattice is stretched to the vehicle's box, so that a bonnet, a roof and wheels lie at about the same nodes
 //! for all vehicles; half of it is enough, for the hull is its own mirror image.
 
-use super::super::VehicleBox;
+use super::super::WorkingBox;
 use crate::prior::volume::{Silhouette, inside_both};
 use crate::scene::View;
 use glam::{DVec3, Vec3};
@@ -34,16 +34,16 @@ pub struct Lattice {
 
 impl Lattice {
     /// Over the box.
-    pub fn around(vehicle_box: &VehicleBox) -> Self {
-        let size = vehicle_box.size();
+    pub fn around(working_box: &WorkingBox) -> Self {
+        let size = working_box.size();
         let inner = |axis: usize, margins: f64| NODES[axis] as f64 - margins * MARGIN[axis] - 1.0;
         let step_x = size[0] / inner(0, 2.0);
         let step_y = 0.5 * size[1] / (inner(1, 1.0) + 0.5);
         let step_z = size[2] / inner(2, 2.0);
         let low = DVec3::new(
-            vehicle_box.low[0] - MARGIN[0] * step_x,
+            working_box.low[0] - MARGIN[0] * step_x,
             0.5 * step_y,
-            vehicle_box.low[2] - MARGIN[2] * step_z,
+            working_box.low[2] - MARGIN[2] * step_z,
         );
         Self { low: low.as_vec3(), step: DVec3::new(step_x, step_y, step_z).as_vec3() }
     }
@@ -85,12 +85,12 @@ pub fn hull_on(lattice: &Lattice, silhouettes: &[Silhouette]) -> Vec<f32> {
 
 /// What the network should know of the box and the cameras, each about 0 to 1: size of the box, number of views,
 /// how the views spread around the vehicle, how high they look from, how far away they are.
-pub fn view_numbers(vehicle_box: &VehicleBox, views: &[View]) -> [f32; VIEW_NUMBERS] {
+pub fn view_numbers(working_box: &WorkingBox, views: &[View]) -> [f32; VIEW_NUMBERS] {
     /// Directions, degrees from the front, and how far one view counts as near another direction.
     const SECTORS_DEGREES: [f64; 5] = [0.0, 45.0, 90.0, 135.0, 180.0];
     const SECTOR_WIDTH_DEGREES: f64 = 25.0;
-    let size = vehicle_box.size();
-    let middle: DVec3 = 0.5 * (DVec3::from_array(vehicle_box.low) + DVec3::from_array(vehicle_box.high));
+    let size = working_box.size();
+    let middle: DVec3 = 0.5 * (DVec3::from_array(working_box.low) + DVec3::from_array(working_box.high));
     let n = views.len() as f64;
     let mut numbers = [0.0f64; VIEW_NUMBERS];
     numbers[0] = size[0] / 8.0;

@@ -11,10 +11,14 @@
 pub mod lattice;
 mod network;
 
+use super::hull::require_masks;
 use super::photo::fit_photographs;
+use super::volume::extent::MIRROR_M;
 use super::volume::relax::HULL_SLACK_M;
-use super::volume::{Field, Silhouette, denied, fill_masks, fit_cloud, inside_both, march};
-use super::{DepthPrior, Geometry, HullPrior, VehicleBox};
+use super::volume::{
+    Field, KnownBox, Silhouette, denied, fill_masks, find_box, fit_cloud, inside_both, inside_known, march,
+};
+use super::{DepthPrior, Ends, Geometry, WorkingBox};
 use crate::error::Result;
 use crate::progress::Context;
 use crate::scene::{Cloud, DepthMap, View};
@@ -48,8 +52,8 @@ const INSET_M: f32 = 0.01;
 /// See the module's documentation.
 #[derive(Clone, Debug, Default)]
 pub struct ShapePrior {
-    /// Length, width, height in metres, where the caller knows them.
-    pub size: Option<[f64; 3]>,
+    /// The vehicle's box, as far as the caller knows it.
+    pub known_box: Option<KnownBox>,
     /// Points measured on the vehicle, where there are some.
     pub cloud: Option<Cloud>,
     /// Whether the surface is also moved to where the photographs agree, see `prior::photo`.
@@ -64,18 +68,17 @@ impl DepthPrior for ShapePrior {
     }
 
     fn estimate(&self, views: &[View], context: &Context) -> Result<Geometry> {
-        let hull = HullPrior { size: self.size, ..HullPrior::default() };
-        hull.require_masks(views)?;
+        require_masks(views)?;
         let silhouettes: Vec<Silhouette> =
             context.parallel(|| views.par_iter().map(Silhouette::new).collect());
         context.report("prior", 0.1)?;
-        let vehicle_box = context.parallel(|| hull.find_box(views, &silhouettes))?;
+        let working_box = context.parallel(|| find_box(self.known_box.as_ref(), views, &silhouettes))?;
         context.report("prior", 0.2)?;
         let network = Network::embedded()?;
-        let mut shape = context.parallel(|| Shape::predict(network, &vehicle_box, &silhouettes, views));
+        let mut shape = context.parallel(|| Shape::predict(network, &working_box, &silhouettes, views));
         context.report("prior", 0.35)?;
         let (mut field, hull) = context.parallel(|| {
-            let (field, hull) = shape.field(&vehicle_box, &silhouettes, self.voxel_m);
+            let (field, hull) = shape.field(&working_box, &silhouettes, self.voxel_m);
             let unknown = denied(&field, &hull, views, DENIED_M);
             if unknown.is_empty() {
                 return (field, hull);
@@ -97,7 +100,9 @@ impl DepthPrior for ShapePrior {
             depths.push(context.parallel(|| shape.with_confidence(view, march::march(view, &field)?))?);
             context.report("prior", 0.8 + 0.2 * (i + 1) as f64 / views.len() as f64)?;
         }
-        Ok(Geometry { points, photo, masks: Some(masks), ..Geometry::new(depths, Some(vehicle_box)) })
+        let error = |p: Vec3| f64::from(shape.lattice.sample(&shape.error, p));
+        let ends = context.parallel(|| Ends::of_field(&field, error));
+        Ok(Geometry { points, ends, photo, masks: Some(masks), ..Geometry::new(depths, Some(working_box)) })
     }
 }
 
@@ -115,13 +120,13 @@ struct Shape {
 impl Shape {
     fn predict(
         network: &Network,
-        vehicle_box: &VehicleBox,
+        working_box: &WorkingBox,
         silhouettes: &[Silhouette],
         views: &[View],
     ) -> Self {
-        let lattice = Lattice::around(vehicle_box);
+        let lattice = Lattice::around(working_box);
         let mut hull = hull_on(&lattice, silhouettes);
-        let input = network_input(&hull, &view_numbers(vehicle_box, views));
+        let input = network_input(&hull, &view_numbers(working_box, views));
         let answer = network.run(&input);
         let [nx, ny, nz] = NODES;
         let mut distance = vec![0.0f32; hull.len()];
@@ -159,14 +164,16 @@ impl Shape {
     /// On a fine grid, nowhere outside the hull, and the hull itself.
     fn field(
         &self,
-        vehicle_box: &VehicleBox,
+        working_box: &WorkingBox,
         silhouettes: &[Silhouette],
         coarser: Option<f64>,
     ) -> (Field, Field) {
-        let (low, high) = (DVec3::from_array(vehicle_box.low), DVec3::from_array(vehicle_box.high));
-        let voxel = super::hull::voxel(vehicle_box, coarser);
-        let margin = DVec3::new(2.0 * voxel, 0.12, 2.0 * voxel);
-        let hull = Field::symmetric(low - margin, high + margin, voxel, |p| inside_both(silhouettes, p));
+        let (low, high) = (DVec3::from_array(working_box.low), DVec3::from_array(working_box.high));
+        let voxel = super::hull::voxel(working_box, coarser);
+        let margin = DVec3::new(2.0 * voxel, MIRROR_M, 2.0 * voxel);
+        let hull = Field::symmetric(low - margin, high + margin, voxel, |p| {
+            inside_both(silhouettes, p).min(inside_known(working_box, p))
+        });
         (self.bounded_by(&hull), hull)
     }
 

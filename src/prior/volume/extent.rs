@@ -3,7 +3,7 @@
 use super::field::Field;
 use super::silhouette::{Silhouette, central_ray};
 use crate::error::{Error, Result};
-use crate::prior::{BoxSource, VehicleBox};
+use crate::prior::{BoxSource, WorkingBox};
 use crate::scene::View;
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
@@ -21,15 +21,63 @@ const NARROWEST_LIMIT_M: f64 = 1.7;
 /// Grid points along the longest axis of the search.
 const SEARCH_POINTS: f64 = 72.0;
 
+/// Outer mirrors stand out of the body by less than this, metres.
+pub(crate) const MIRROR_M: f64 = 0.12;
+
 /// Farther outside than this nobody asks how far, metres.
 const FAR_OUTSIDE_M: f32 = -1.0;
 
-/// Finds the box by carving coarsely, each time in what was left of the box before: first in a cube around where
-/// the views look.
-pub fn estimate_box(views: &[View], inside: impl Fn(Vec3) -> f32 + Sync) -> Result<VehicleBox> {
+/// What the silhouettes leave: lowest and highest corner, metres; the vehicle lies within.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// Lowest corner.
+    pub low: DVec3,
+    /// Highest corner.
+    pub high: DVec3,
+}
+
+impl Extent {
+    /// The box of a vehicle of which nothing else is known.
+    ///
+    /// # Errors
+    /// [`Error::Reconstruction`] where no road vehicle is so large.
+    pub fn estimated_box(&self) -> Result<WorkingBox> {
+        let size = self.high - self.low;
+        if size.cmpgt(LARGEST_M * 1.2).any() {
+            return Err(Error::Reconstruction {
+                stage: "prior",
+                reason: format!(
+                    "the silhouettes bound a box of {:.1} x {:.1} x {:.1} m, larger than any road vehicle; check \
+                     that poses are metric and in the vehicle frame, or pass the vehicle's size",
+                    size.x, size.y, size.z
+                ),
+            });
+        }
+        Ok(WorkingBox {
+            low: self.low.to_array(),
+            high: self.high.to_array(),
+            source: BoxSource::Estimated,
+            contradicted_m: 0.0,
+        })
+    }
+}
+
+/// Bounds the vehicle by carving coarsely, each time in what was left before: first in a cube around where the views
+/// look. A vehicle of a known size may be as wide as that; of another one the width is what road vehicles and their wheels
+/// allow.
+///
+/// # Errors
+/// [`Error::Reconstruction`] where the silhouettes meet nowhere.
+pub fn extent(
+    views: &[View],
+    known_size: Option<[f64; 3]>,
+    inside: impl Fn(Vec3) -> f32 + Sync,
+) -> Result<Extent> {
     let center = meeting_point(views);
     let radius = search_radius(views, center)?;
-    let y = radius.min(0.5 * LARGEST_M.y);
+    // Views from one end see the length foreshortened, and the point they meet at is near that end.
+    let radius = known_size.map_or(radius, |[length, ..]| radius.max(length));
+    let y = known_size.map_or(radius.min(0.5 * LARGEST_M.y), |[_, width, _]| 0.5 * width);
     let mut low = DVec3::new(center.x - radius, -y, center.z - radius);
     let mut high = DVec3::new(center.x + radius, y, center.z + radius);
     for _ in 0..3 {
@@ -47,25 +95,19 @@ pub fn estimate_box(views: &[View], inside: impl Fn(Vec3) -> f32 + Sync) -> Resu
         let margin = DVec3::splat(voxel);
         low = (bounds.0 - margin).max(low);
         high = (bounds.1 + margin).min(high);
+        if known_size.is_some() {
+            continue;
+        }
         let length = high.x - low.x;
         let half_width = (0.5 * WIDTH_OVER_LENGTH * length).max(0.5 * NARROWEST_LIMIT_M);
         (low.y, high.y) = (low.y.max(-half_width), high.y.min(half_width));
     }
-    if let Some(half_width) = half_width_at_the_wheels(low, high, &inside) {
+    if known_size.is_none()
+        && let Some(half_width) = half_width_at_the_wheels(low, high, &inside)
+    {
         (low.y, high.y) = (low.y.max(-half_width), high.y.min(half_width));
     }
-    let size = high - low;
-    if size.cmpgt(LARGEST_M * 1.2).any() {
-        return Err(Error::Reconstruction {
-            stage: "prior",
-            reason: format!(
-                "the silhouettes bound a box of {:.1} x {:.1} x {:.1} m, larger than any road vehicle; check \
-                 that poses are metric and in the vehicle frame, or pass the box",
-                size.x, size.y, size.z
-            ),
-        });
-    }
-    Ok(VehicleBox { low: low.to_array(), high: high.to_array(), source: BoxSource::Estimated })
+    Ok(Extent { low, high })
 }
 
 /// Half the width where the vehicle stands on the ground, or `None` if nothing stands.
@@ -151,23 +193,25 @@ fn search_radius(views: &[View], center: DVec3) -> Result<f64> {
     Ok(radius.clamp(1.0, LARGEST_M.x))
 }
 
-/// The caller's size placed where the silhouettes are: same middle along x, same ground.
-pub fn place_box(size: [f64; 3], estimated: &VehicleBox) -> VehicleBox {
-    let middle = 0.5 * (estimated.low[0] + estimated.high[0]);
-    let ground = estimated.low[2];
-    VehicleBox {
-        low: [middle - 0.5 * size[0], -0.5 * size[1], ground],
-        high: [middle + 0.5 * size[0], 0.5 * size[1], ground + size[2]],
-        source: BoxSource::Given,
-    }
-}
-
 /// How far inside the box `p` is, metres.
-pub fn inside_box(vehicle_box: &VehicleBox, p: Vec3) -> f32 {
+pub fn inside_box(working_box: &WorkingBox, p: Vec3) -> f32 {
     let p = p.to_array();
     (0..3)
-        .map(|k| (p[k] - vehicle_box.low[k] as f32).min(vehicle_box.high[k] as f32 - p[k]))
+        .map(|k| (p[k] - working_box.low[k] as f32).min(working_box.high[k] as f32 - p[k]))
         .fold(f32::INFINITY, f32::min)
+}
+
+/// How far inside a box that the caller knows `p` is, metres; infinite inside one that was estimated, which bounds nothing
+/// that the silhouettes do not. Mirrors stand out of widths that are given without them.
+pub fn inside_known(working_box: &WorkingBox, p: Vec3) -> f32 {
+    match working_box.source {
+        BoxSource::Estimated => f32::INFINITY,
+        BoxSource::Given => {
+            let mut wide = *working_box;
+            (wide.low[1], wide.high[1]) = (wide.low[1] - MIRROR_M, wide.high[1] + MIRROR_M);
+            inside_box(&wide, p)
+        }
+    }
 }
 
 /// All silhouettes' verdict: how far inside all cones; far outside, 1 m, some value below that.

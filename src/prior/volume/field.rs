@@ -120,6 +120,43 @@ impl Field {
         self.voxel
     }
 
+    /// Where the zero surface begins and ends along each axis, interpolated, and the points that reach farthest there:
+    /// `[axis][low, high]`; `None` where nothing is inside.
+    pub(crate) fn surface_ends(&self) -> Option<[[(f32, Vec3); 2]; 3]> {
+        let [nx, ny, nz] = self.size;
+        let strides = [1, nx, nx * ny];
+        // The largest value of each slice and where it is.
+        let mut slices = self.size.map(|n| vec![(f32::NEG_INFINITY, 0usize); n]);
+        for (index, &value) in self.values.iter().enumerate() {
+            for (axis, slices) in slices.iter_mut().enumerate() {
+                let slice = &mut slices[index / strides[axis] % [nx, ny, nz][axis]];
+                if value > slice.0 {
+                    *slice = (value, index);
+                }
+            }
+        }
+        let point = |index: usize| {
+            self.low
+                + self.voxel
+                    * Vec3::new((index % nx) as f32, (index / nx % ny) as f32, (index / (nx * ny)) as f32)
+        };
+        let end = |axis: usize, from: usize, outward: isize| {
+            let (inside, index) = slices[axis][from];
+            let beyond = from.checked_add_signed(outward).and_then(|k| slices[axis].get(k));
+            // Beyond the grid there is nothing.
+            let way = beyond.map_or(0.0, |(outside, _)| inside / (inside - outside).max(1e-6));
+            let at = point(index);
+            (at[axis] + outward as f32 * way * self.voxel, at)
+        };
+        let mut ends = [[(0.0, Vec3::ZERO); 2]; 3];
+        for (axis, ends) in ends.iter_mut().enumerate() {
+            let first = slices[axis].iter().position(|(value, _)| *value > 0.0)?;
+            let last = slices[axis].iter().rposition(|(value, _)| *value > 0.0)?;
+            *ends = [end(axis, first, -1), end(axis, last, 1)];
+        }
+        Some(ends)
+    }
+
     /// Lowest and highest grid point.
     pub(crate) fn bounds(&self) -> (Vec3, Vec3) {
         let extent = Vec3::from_array(self.size.map(|n| (n - 1) as f32)) * self.voxel;
@@ -167,6 +204,20 @@ impl Field {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_ends_of_a_ball_are_its_radius_from_its_middle() {
+        let middle = Vec3::new(0.1, 0.0, -0.05);
+        let ball = Field::carve(DVec3::splat(-0.7), DVec3::splat(0.7), 0.03, |p| 0.413 - p.distance(middle));
+        let ends = ball.surface_ends().unwrap();
+        for axis in 0..3 {
+            let [(low, _), (high, _)] = ends[axis];
+            assert!(
+                (low - (middle[axis] - 0.413)).abs() < 2e-3 && (high - (middle[axis] + 0.413)).abs() < 2e-3
+            );
+        }
+        assert!(Field::carve(DVec3::splat(-0.5), DVec3::splat(0.5), 0.1, |_| -1.0).surface_ends().is_none());
+    }
 
     fn wedge() -> Field {
         // Inside where x < 0 and z < 0: a crease along y.

@@ -6,8 +6,8 @@ use super::spacing::spacing;
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
 use crate::gaussians::buffer::Gaussian;
-use crate::prior::VehicleBox;
-use crate::prior::volume::{Silhouette, estimate_box, inside_all, place_box};
+use crate::prior::WorkingBox;
+use crate::prior::volume::{KnownBox, Silhouette, find_box};
 use crate::scene::{Cloud, View};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -26,7 +26,7 @@ const START: u64 = u64::MAX;
 pub(crate) struct Start {
     pub(crate) gaussians: Gaussians,
     /// What was filled, where there was no cloud.
-    pub(crate) filled: Option<VehicleBox>,
+    pub(crate) filled: Option<WorkingBox>,
     /// Points of the cloud that no picture has.
     pub(crate) strays: usize,
 }
@@ -37,7 +37,7 @@ impl Start {
     pub(crate) fn new(
         views: &[View],
         cloud: Option<&Cloud>,
-        size: Option<[f64; 3]>,
+        known_box: Option<&KnownBox>,
         options: &BaselineOptions,
     ) -> Result<Self> {
         for (i, view) in views.iter().enumerate() {
@@ -49,8 +49,7 @@ impl Start {
         }
         let Some(cloud) = cloud else {
             let silhouettes: Vec<Silhouette> = views.par_iter().map(Silhouette::new).collect();
-            let estimated = estimate_box(views, |p| inside_all(&silhouettes, p))?;
-            let filled = size.map_or(estimated, |size| place_box(size, &estimated));
+            let filled = find_box(known_box, views, &silhouettes)?;
             let points = drawn(&filled, options);
             return Ok(Self { gaussians: made(&points, options), filled: Some(filled), strays: 0 });
         };
@@ -87,7 +86,7 @@ fn is_in_picture(view: &View, point: [f32; 3]) -> bool {
 }
 
 /// Points spread evenly over a box.
-fn drawn(of: &VehicleBox, options: &BaselineOptions) -> Vec<[f32; 3]> {
+fn drawn(of: &WorkingBox, options: &BaselineOptions) -> Vec<[f32; 3]> {
     let point = |i: usize| {
         let mut chance = Chance::of([options.seed, START, i as u64]);
         std::array::from_fn(|k| (of.low[k] + chance.uniform() * (of.high[k] - of.low[k])) as f32)

@@ -1,6 +1,6 @@
 //! How a reconstruction is made, as options of the command line.
 
-use super::values::{VehicleSize, at_least_one, backend, positive, refinement, share, vehicle_size};
+use super::values::{KnownBox, at_least_one, backend, known_box, positive, refinement, share};
 use crate::job::{self, Failure, USAGE};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
@@ -46,9 +46,10 @@ pub(crate) struct MethodArgs {
     /// they are (off)
     #[arg(long, value_enum, default_value_t = Calibration::Auto)]
     calibrate: Calibration,
-    /// Length, width and height of the vehicle in metres, where known
-    #[arg(long = "box", value_name = "L,W,H", value_parser = vehicle_size)]
-    vehicle_size: Option<VehicleSize>,
+    /// Length, width and height of the vehicle in metres, where known, to a few centimetres; with X,Y,Z,YAW also where its
+    /// box stands: the centre in metres and the turn about z in radians, in the frame of the cameras
+    #[arg(long = "box", value_name = "L,W,H[,X,Y,Z,YAW]", value_parser = known_box, allow_hyphen_values = true)]
+    vehicle_box: Option<KnownBox>,
     /// Highest degree of the spherical harmonics that hold the colour [default: 2; of a baseline 3]
     #[arg(long, value_name = "0..3", value_parser = clap::value_parser!(u8).range(0..=3))]
     sh_degree: Option<u8>,
@@ -171,7 +172,8 @@ impl MethodArgs {
                 Calibration::Auto => Calibrate::Auto,
                 Calibration::Off => Calibrate::Off,
             },
-            vehicle_size: self.vehicle_size.map(|s| s.0),
+            vehicle_size: self.vehicle_box.map(|known| known.0.size),
+            vehicle_place: self.vehicle_box.and_then(|known| known.0.place),
             sh_degree: self.sh_degree.unwrap_or(Options::default().sh_degree),
             keep: Keep {
                 duplicate_views: kept(KeepItem::DuplicateViews),

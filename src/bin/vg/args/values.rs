@@ -3,6 +3,7 @@
 use vg::pipeline::Options;
 use vg::refine::{Amount, RefineOptions};
 use vg::render::{Backend, Background};
+use vg::scene::{Place, VehicleBox};
 
 /// Length, width, height in metres. A type of its own: the parser would take an array for a list of values.
 #[derive(Clone, Copy)]
@@ -13,6 +14,29 @@ pub(super) fn vehicle_size(text: &str) -> Result<VehicleSize, String> {
     match (Options { vehicle_size: Some(size), ..Options::default() }).validate() {
         Ok(()) => Ok(VehicleSize(size)),
         Err(vg::Error::Argument { allowed, .. }) => Err(format!("expected {allowed}")),
+        Err(other) => Err(other.to_string()),
+    }
+}
+
+/// A box, and where it stands if that is said. A type of its own for the same reason.
+#[derive(Clone, Copy)]
+pub(super) struct KnownBox(pub(super) VehicleBox);
+
+pub(super) fn known_box(text: &str) -> Result<KnownBox, String> {
+    const EXPECTED: &str =
+        "expected length,width,height in metres, or these and x,y,z of the centre and the yaw in radians";
+    let numbers: Vec<f64> =
+        text.split(',').map(|part| part.trim().parse()).collect::<Result<_, _>>().map_err(|_| EXPECTED)?;
+    let known = match numbers[..] {
+        [l, w, h] => VehicleBox { size: [l, w, h], place: None },
+        [l, w, h, x, y, z, yaw] => {
+            VehicleBox { size: [l, w, h], place: Some(Place { center: [x, y, z], yaw }) }
+        }
+        _ => return Err(EXPECTED.into()),
+    };
+    match known.validate("box") {
+        Ok(()) => Ok(KnownBox(known)),
+        Err(vg::Error::Argument { argument, allowed, .. }) => Err(format!("{argument}: expected {allowed}")),
         Err(other) => Err(other.to_string()),
     }
 }

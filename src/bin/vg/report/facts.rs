@@ -24,13 +24,18 @@ pub(super) struct Part {
 pub(super) fn parts(report: &Report) -> Vec<Part> {
     let part = |heading, rows: Option<Rows>| Some(Part { heading, rows: rows? });
     let ours = report.settings.baseline.is_none();
-    let vehicle_box = report.vehicle_box.map(|b| {
+    let vehicle = report.vehicle.map(|v| {
+        let [length, width, height] =
+            std::array::from_fn(|k| format!("{:.2} ± {:.2} m", v.size_m[k], v.uncertainty_m[k]));
+        vec![("length", length), ("width, often without mirrors", width), ("height", height)]
+    });
+    let working_box = report.working_box.map(|b| {
         let source = match b.source {
-            BoxSource::Given => "the caller",
+            BoxSource::Given => "the caller's size and the silhouettes",
             BoxSource::Estimated => "the silhouettes",
         };
         vec![
-            ("known from", source.into()),
+            ("bounded by", source.into()),
             ("length, width, height", lengths(b.size_m)),
             ("lowest corner", lengths(b.low_m)),
         ]
@@ -40,10 +45,11 @@ pub(super) fn parts(report: &Report) -> Vec<Part> {
         vec![("vehicle pixels that miss it", change(both, "%"))]
     });
     [
+        part("The vehicle's size", vehicle),
         part("How the unseen side was completed", ours.then(|| symmetry(&report.symmetry))),
         part("Its light", report.relight.as_ref().map(relight)),
         part("Calibration of the cameras", report.calibration.as_ref().map(calibration)),
-        part("The box the vehicle was looked for in", vehicle_box),
+        part("The box the vehicle was looked for in, which is larger", working_box),
         part("The surface, by what the photographs agree on", report.photo.as_ref().map(photo)),
         part("The surface, by the masks", masks),
         part("The surface, by measured points", report.cloud.as_ref().map(points)),
@@ -145,7 +151,8 @@ fn budget(plan: &BudgetPlan) -> Rows {
     let most = plan.chosen.max_views.map_or("all".into(), |n| n.to_string());
     vec![
         ("given", format!("{} s", number(plan.budget_s))),
-        ("predicted", format!("{} s{}", number(plan.predicted_s), if plan.fits { "" } else { ", too much" })),
+        ("predicted", format!("{} s", number(plan.predicted_s))),
+        ("taken", format!("{} s{}", number(plan.took_s), if plan.kept { "" } else { ", too much" })),
         ("depth from", plan.chosen.prior.name().into()),
         ("share of width and height", number(plan.chosen.resolution)),
         ("views at most", most),
