@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import functools
 import inspect
 import sys
 from typing import TypeVar
@@ -13,14 +12,18 @@ T = TypeVar("T")
 
 def documented(cls: type[T]) -> type[T]:
     """Gives the fields of a named tuple the strings that follow them in the source."""
-    for field, text in _texts(cls.__module__).get(cls.__name__, {}).items():
+    if cls.__module__ not in _TEXTS:
+        _TEXTS[cls.__module__] = _texts(cls.__module__)
+    for field, text in _TEXTS[cls.__module__].get(cls.__name__, {}).items():
         getattr(cls, field).__doc__ = text
     return cls
 
 
-@functools.lru_cache
+#: Strings after fields, by module, class and field.
+_TEXTS: dict[str, dict[str, dict[str, str]]] = {}
+
+
 def _texts(module: str) -> dict[str, dict[str, str]]:
-    """Strings after fields, by class and field."""
     try:
         tree = ast.parse(inspect.getsource(sys.modules[module]))
     except OSError:
