@@ -1256,6 +1256,8 @@ def reconstruct(
     """
     images, cameras = listed(images, "images", 3), listed(cameras, "cameras")
     n = len(images)
+    if n == 0:
+        raise bad_value("images", "none", "at least one")
     columns: dict[str, list[Any]] = {
         "cameras": cameras,
         "masks": [None] * n if masks is None else listed(masks, "masks", 2),
