@@ -1,9 +1,10 @@
 //! From the world of a structure-from-motion model to the vehicle's frame; `vehicle_gaussians._align` names the numbers.
 
-use crate::arrays::{array, matrix4, numbers, owned, shape_text, values, vector};
+use crate::arrays::{floats, matrix4, numbers, owned, shape_text, values, vector};
 use crate::camera::Camera;
 use crate::errors::{bad_value, from_library, pooled, renamed};
 use crate::reconstruct::mask;
+use crate::whole;
 use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -29,9 +30,9 @@ pub(crate) fn align_scan<'py>(
     sparse: Option<&Bound<'py, PyAny>>,
     heading: &str,
     names: Option<Vec<String>>,
-    threads: usize,
+    #[pyo3(from_py_with = whole::threads)] threads: usize,
 ) -> PyResult<Found<'py>> {
-    let scan = array::<f32>(scan, "scan", "a NumPy array of float32, metres, (n, 3)")?;
+    let scan = floats(scan, "scan", "an array of floats, metres, (n, 3)")?;
     if !matches!(scan.shape(), [_, 3]) {
         return Err(bad_value(py, "scan", &shape_text(scan.shape()), "(n, 3)"));
     }
@@ -57,7 +58,7 @@ pub(crate) fn align_box<'py>(
     size: &Bound<'py, PyAny>,
     heading: &str,
     names: Option<Vec<String>>,
-    threads: usize,
+    #[pyo3(from_py_with = whole::threads)] threads: usize,
 ) -> PyResult<Found<'py>> {
     let views = views_of(py, &masks, &cameras, names)?;
     let (sparse, size) = (rows(sparse, "sparse")?, vector::<3>(size, "size")?);
@@ -111,7 +112,7 @@ pub(crate) fn align_folder<'py>(
     path: PathBuf,
     scan: Option<PathBuf>,
     heading: &str,
-    threads: usize,
+    #[pyo3(from_py_with = whole::threads)] threads: usize,
 ) -> PyResult<Found<'py>> {
     let heading = heading_of(py, heading)?;
     let (_, found) = pooled(py, threads, || folder_to_scan(&path, scan.as_deref(), heading))?;
