@@ -72,10 +72,7 @@ def check_checkout() -> None:
 
 def build_library(features: list[str]) -> Path:
     """The shared library with the C functions, built with the dependencies and settings of the extension module."""
-    cargo = shutil.which("cargo")
-    if cargo is None:
-        sys.exit("vehicle-gaussians: cargo is not on PATH: install Rust 1.89 or newer")
-    command = [cargo, "build", "--release", "--locked", "--package", "vehicle-gaussians", "--lib"]
+    command = [find_cargo(), "build", "--release", "--locked", "--package", "vehicle-gaussians", "--lib"]
     # Features can only be asked of the library's own workspace; its lock file holds the same versions.
     manifest = ROOT / "Cargo.toml" if features else HERE / "Cargo.toml"
     if features:
@@ -91,6 +88,17 @@ def build_library(features: list[str]) -> Path:
                 if file.suffix in (".so", ".dylib", ".dll"):
                     return file
     sys.exit("vehicle-gaussians: cargo built no shared library")
+
+
+def find_cargo() -> str:
+    """Cargo, before maturin looks for it: without one maturin tries to install Rust, and ends in a traceback."""
+    cargo = shutil.which("cargo")
+    if cargo is None:
+        sys.exit(
+            "vehicle-gaussians: no Rust here (cargo is not on PATH), which this package is built with. Install Rust 1.89 or "
+            "newer (https://rustup.rs), or take a wheel that was built elsewhere: `pip wheel ./bindings/python` makes one"
+        )
+    return cargo
 
 
 def fill(folder: Path, files: list[Path]) -> None:
@@ -126,11 +134,13 @@ def build_sdist(sdist_directory: str, config_settings: Any = None) -> str:
 
 def prepare_metadata_for_build_wheel(metadata_directory: str, config_settings: Any = None) -> str:
     check_checkout()
+    find_cargo()
     return str(maturin().prepare_metadata_for_build_wheel(metadata_directory, for_maturin(config_settings)))
 
 
 def prepare_metadata_for_build_editable(metadata_directory: str, config_settings: Any = None) -> str:
     check_checkout()
+    find_cargo()
     return str(maturin().prepare_metadata_for_build_editable(metadata_directory, for_maturin(config_settings)))
 
 

@@ -54,6 +54,16 @@ def test_a_source_distribution_is_refused_with_the_way_out(tmp_path: Path) -> No
     assert ran.returncode == 1 and "`pip wheel ./bindings/python`" in ran.stderr
 
 
+@pytest.mark.parametrize("hook", ["build_wheel", "prepare_metadata_for_build_wheel", "prepare_metadata_for_build_editable"])
+def test_a_build_without_rust_says_what_to_install(hook: str, tmp_path: Path) -> None:
+    code = f"import build_backend; build_backend.{hook}({str(tmp_path)!r})"
+    nowhere = {**os.environ, "PATH": str(tmp_path)}
+    ran = subprocess.run(
+        [sys.executable, "-c", code], cwd=BINDINGS, capture_output=True, text=True, check=False, env=nowhere
+    )
+    assert ran.returncode == 1 and "Install Rust 1.89 or newer" in ran.stderr and "Traceback" not in ran.stderr
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="sonames are ELF's")
 def test_only_the_c_library_is_called_libvg() -> None:
     # A program in the same process that needs libvg.so.0 would be given the extension module instead.
