@@ -8,12 +8,14 @@ use super::render::{backend, vg_backend};
 use super::status::{c_string, one_line, vg_status};
 use crate::error::{Error, Result};
 use crate::pipeline::{Calibrate, Keep, Options, PriorChoice};
+use crate::progress::Progress;
 use crate::refine::{Amount, RefineOptions};
 use crate::relight::Relight;
 use crate::scene::cloud::MAX_CLOUD_POINTS;
 use crate::scene::{Cloud, Place};
 use crate::symmetry::SymmetryMode;
 use std::ffi::{CString, c_char, c_void};
+use std::ops::ControlFlow;
 
 /// Where metric depth comes from.
 #[repr(i32)]
@@ -341,6 +343,20 @@ fn keep(bits: u32) -> Result<Keep> {
         floaters: has(vg_keep::Floaters),
         sh_bands: has(vg_keep::ShBands),
     })
+}
+
+/// Tells the caller's callback, where there is one, how far a call is.
+pub(super) unsafe fn tell(
+    callback: vg_progress_fn,
+    user: *mut c_void,
+    progress: Progress,
+) -> ControlFlow<()> {
+    let Some(callback) = callback else { return ControlFlow::Continue(()) };
+    let stage = c_string(progress.stage.to_owned());
+    match unsafe { callback(stage.as_ptr(), progress.fraction, user) } {
+        0 => ControlFlow::Continue(()),
+        _ => ControlFlow::Break(()),
+    }
 }
 
 /// The caller's log, or nobody.

@@ -3,16 +3,14 @@
 use super::context::{Workshop, in_context};
 use super::gaussians::{self, vg_gaussians};
 use super::guard::{clear, guarded};
-use super::options::{Log, vg_log_level, vg_options};
+use super::options::{Log, tell, vg_log_level, vg_options};
 use super::read;
 use super::report::{ReportObject, vg_report};
-use super::status::{c_string, vg_error, vg_status};
+use super::status::{vg_error, vg_status};
 use super::view::{self, vg_view};
 use crate::error::Result;
 use crate::pipeline::{self, Reconstruction, Report};
-use crate::progress::Progress;
 use crate::scene::Scene;
-use std::ops::ControlFlow;
 
 /// Makes a complete vehicle of photographs of one side.
 ///
@@ -59,14 +57,7 @@ unsafe fn run(
     settings: &pipeline::Options,
     options: &vg_options,
 ) -> Result<Reconstruction> {
-    let mut progress = |progress: Progress| {
-        let Some(callback) = options.progress else { return ControlFlow::Continue(()) };
-        let stage = c_string(progress.stage.to_owned());
-        match unsafe { callback(stage.as_ptr(), progress.fraction, options.progress_user) } {
-            0 => ControlFlow::Continue(()),
-            _ => ControlFlow::Break(()),
-        }
-    };
+    let mut progress = |at| unsafe { tell(options.progress, options.progress_user, at) };
     let mut made = pipeline::reconstruct_on(&shop.threads, scene, settings, &mut progress)?;
     made.report.settings.threads = shop.threads.count();
     unsafe { log(Log { callback: options.log, user: options.log_user }, &made.report) };
