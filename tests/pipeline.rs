@@ -520,7 +520,7 @@ fn a_huge_budget_changes_no_byte_and_no_setting() {
     assert!(made.gaussians == free.gaussians);
     assert_eq!(made.report.settings, Options::default());
     assert_eq!(made.report.left_out, free.report.left_out);
-    let plan = made.report.plan.unwrap();
+    let plan = made.report.plan.clone().unwrap();
     assert!(plan.fits && plan.budget_s == 1e6 && plan.predicted_s > 0.0 && plan.machine.serial > 0.0);
     assert!(plan.kept && plan.took_s > 0.0 && made.report.warnings().is_empty(), "{plan:?}");
     assert_eq!(free.report.plan, None);
