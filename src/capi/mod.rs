@@ -37,6 +37,8 @@ mod report;
 
 mod gaussians;
 
+mod watched;
+
 mod reconstruct;
 
 mod render;

@@ -93,9 +93,11 @@ pub enum vg_log_level {
     Debug = 3,
 }
 
-/// Called on the calling thread at every stage boundary and inside long stages: the stage's name, how much of it is
-/// done, 0 to 1, and the caller's pointer. Returns 0 to go on; anything else ends the call with
-/// `VG_STATUS_CANCELLED`. May call the library; may not throw or jump out.
+/// Called on the calling thread: the stage's name, how much of it is done, 0 to 1, and the caller's pointer. Returns 0
+/// to go on; anything else ends the call with `VG_STATUS_CANCELLED`. May call the library; may not throw or jump out.
+///
+/// A reconstruction calls it at every stage boundary, inside long stages, and at the end. Calls of one stage call it at
+/// the start, about every 50 ms, and with 1 at the end; they stop within some tenths of a second.
 pub type vg_progress_fn =
     Option<unsafe extern "C" fn(stage: *const c_char, fraction: f64, user: *mut c_void) -> i32>;
 
@@ -175,6 +177,9 @@ pub struct vg_options {
     pub refine_backend: i32,
     /// Must be 0.
     pub refine_flags: u32,
+    /// NULL, or where the part of the whole call that is done is written before each call of `progress`: 0 to 1, in
+    /// expected time; it never falls, and is 1 in the last call.
+    pub progress_overall: *mut f64,
 }
 
 unsafe impl Versioned for vg_options {
@@ -212,6 +217,7 @@ unsafe impl Versioned for vg_options {
             refine_hold_out: 0,
             refine_backend: vg_backend::Auto as i32,
             refine_flags: 0,
+            progress_overall: std::ptr::null_mut(),
         }
     }
 }

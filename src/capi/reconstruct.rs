@@ -6,13 +6,13 @@ use super::guard::{clear, guarded};
 use super::options::{Log, vg_log_level, vg_options};
 use super::read;
 use super::report::{ReportObject, vg_report};
-use super::status::{c_string, vg_error, vg_status};
+use super::status::{vg_error, vg_status};
 use super::view::{self, vg_view};
+use super::watched::Told;
 use crate::error::Result;
 use crate::pipeline::{self, Reconstruction, Report};
 use crate::progress::Progress;
 use crate::scene::Scene;
-use std::ops::ControlFlow;
 
 /// Makes a complete vehicle of photographs of one side.
 ///
@@ -59,13 +59,12 @@ unsafe fn run(
     settings: &pipeline::Options,
     options: &vg_options,
 ) -> Result<Reconstruction> {
+    let told = Told { callback: options.progress, user: options.progress_user };
     let mut progress = |progress: Progress| {
-        let Some(callback) = options.progress else { return ControlFlow::Continue(()) };
-        let stage = c_string(progress.stage.to_owned());
-        match unsafe { callback(stage.as_ptr(), progress.fraction, options.progress_user) } {
-            0 => ControlFlow::Continue(()),
-            _ => ControlFlow::Break(()),
+        if !options.progress_overall.is_null() {
+            unsafe { options.progress_overall.write_unaligned(progress.overall) };
         }
+        unsafe { told.tell(progress) }
     };
     let mut made = pipeline::reconstruct_on(&shop.threads, scene, settings, &mut progress)?;
     made.report.settings.threads = shop.threads.count();

@@ -5,6 +5,7 @@ use super::{colmap, load, select};
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, Similarity};
 use crate::io::ply::ColoredPoints;
+use crate::progress::{UNWATCHED, Watch};
 use crate::scene::Scene;
 use glam::DVec3;
 use std::path::{Path, PathBuf};
@@ -122,6 +123,11 @@ pub fn open_scene(path: &Path, options: &SceneOptions) -> Result<SceneFiles> {
     list_scene(path, options)?.load()
 }
 
+/// As [`open_scene`], under `watch`, which is told of every view and looked at before the next.
+pub fn open_scene_watched(path: &Path, options: &SceneOptions, watch: &Watch) -> Result<SceneFiles> {
+    list_scene(path, options)?.load_watched(watch)
+}
+
 impl SceneIndex {
     /// The cameras alone.
     pub fn cameras(&self) -> Vec<NamedCamera> {
@@ -142,7 +148,11 @@ impl SceneIndex {
 
     /// Reads the pixels of all views listed.
     pub fn load(self) -> Result<SceneFiles> {
-        let (scene, notes) = load::load(&self.views)?;
+        self.load_watched(&UNWATCHED)
+    }
+
+    fn load_watched(self, watch: &Watch) -> Result<SceneFiles> {
+        let (scene, notes) = load::load(&self.views, watch)?;
         Ok(SceneFiles { index: self, scene, notes })
     }
 }

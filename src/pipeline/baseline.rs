@@ -2,9 +2,9 @@
 
 use super::check::input_error;
 use super::options::Options;
-use super::plan;
 use super::report::{Clock, Report, peak_rss_bytes};
 use super::run::{Reconstruction, chosen_views, undistorted};
+use super::{budget, cost, plan};
 use crate::error::Result;
 use crate::progress::Context;
 use crate::refine::baseline::{self, BaselineOptions, Start};
@@ -20,6 +20,7 @@ pub(super) fn reconstruct(
     context: &Context,
 ) -> Result<Reconstruction> {
     context.report("plan", 0.0)?;
+    context.follow(cost::course_of_baseline(&budget::load(scene), options, how, context.threads()));
     let mut left_out = Vec::new();
     let used = plan::views(scene, &options.keep, &mut left_out)?;
     let used = chosen_views(scene, used, options, &mut left_out);
@@ -75,5 +76,6 @@ pub(super) fn reconstruct(
         input_error,
         settings: options.clone(),
     };
+    context.report_end()?;
     Ok(Reconstruction { gaussians, points: None, report })
 }

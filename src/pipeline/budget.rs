@@ -89,7 +89,8 @@ pub(super) fn resolved(
     (chosen, Some(plan))
 }
 
-fn load(scene: &Scene) -> Load {
+/// What the views of a scene amount to.
+pub(super) fn load(scene: &Scene) -> Load {
     let shows = |v: &&crate::scene::View| v.mask.as_ref().is_none_or(|m| m.vehicle_pixels() > 0);
     let views: Vec<_> = scene.views.iter().filter(shows).collect();
     let mean = |sum: f64| 1e-6 * sum / views.len().max(1) as f64;

@@ -80,6 +80,7 @@ pub fn reconstruct_on<'a>(
     let mut left_out = Vec::new();
     let (options, budget) = budget::resolved(scene, options, &context, || clock.elapsed(), &mut left_out);
     let options = &options;
+    context.follow(cost::course(&budget::load(scene), options, context.threads()));
     let used = plan::views(scene, &options.keep, &mut left_out)?;
     let used = chosen_views(scene, used, options, &mut left_out);
     clock.lap("plan");
@@ -188,6 +189,7 @@ pub fn reconstruct_on<'a>(
         input_error,
         settings: options.clone(),
     };
+    context.report_end()?;
     Ok(Reconstruction { gaussians, points, report })
 }
 

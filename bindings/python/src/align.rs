@@ -2,13 +2,15 @@
 
 use crate::arrays::{array, matrix4, numbers, owned, shape_text, values, vector};
 use crate::camera::Camera;
-use crate::errors::{bad_value, from_library, pooled, renamed};
+use crate::errors::{bad_value, from_library, renamed};
 use crate::reconstruct::mask;
+use crate::watched::watched;
 use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use vg::View;
-use vg::align::{BoxAlignment, Heading, ScanAlignment, folder_to_scan, to_box, to_scan};
+use vg::align::{BoxAlignment, Heading, ScanAlignment};
+use vg::align::{folder_to_scan_watched, to_box_watched, to_scan_watched};
 use vg::geometry::Similarity;
 use vg::scene::Cloud;
 
@@ -20,7 +22,7 @@ type Matrix<'py> = Bound<'py, PyArray2<f64>>;
 type Found<'py> = (Matrix<'py>, f64, f64, f64, Option<f64>, Option<f64>, usize);
 
 #[pyfunction]
-#[pyo3(signature = (masks, cameras, scan, sparse, heading, names, threads))]
+#[pyo3(signature = (masks, cameras, scan, sparse, heading, names, threads, progress))]
 pub(crate) fn align_scan<'py>(
     py: Python<'py>,
     masks: Vec<Option<Bound<'py, PyAny>>>,
@@ -30,6 +32,7 @@ pub(crate) fn align_scan<'py>(
     heading: &str,
     names: Option<Vec<String>>,
     threads: usize,
+    progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Found<'py>> {
     let scan = array::<f32>(scan, "scan", "a NumPy array of float32, metres, (n, 3)")?;
     if !matches!(scan.shape(), [_, 3]) {
@@ -40,15 +43,15 @@ pub(crate) fn align_scan<'py>(
     let views = views_of(py, &masks, &cameras, names)?;
     let sparse = sparse.map_or_else(|| Ok(Vec::new()), |object| rows(object, "sparse"))?;
     let heading = heading_of(py, heading)?;
-    let found = pooled(py, threads, || {
+    let found = watched(py, threads, "align", progress, |watch| {
         let scan = Cloud::new(points).map_err(|e| renamed(e, "cloud", "scan"))?;
-        to_scan(&views, &sparse.iter().map(|&p| p.into()).collect::<Vec<_>>(), &scan, heading)
+        to_scan_watched(&views, &sparse.iter().map(|&p| p.into()).collect::<Vec<_>>(), &scan, heading, watch)
     })?;
     Ok(by_scan(py, &found))
 }
 
 #[pyfunction]
-#[pyo3(signature = (masks, cameras, sparse, size, heading, names, threads))]
+#[pyo3(signature = (masks, cameras, sparse, size, heading, names, threads, progress))]
 pub(crate) fn align_box<'py>(
     py: Python<'py>,
     masks: Vec<Option<Bound<'py, PyAny>>>,
@@ -58,13 +61,21 @@ pub(crate) fn align_box<'py>(
     heading: &str,
     names: Option<Vec<String>>,
     threads: usize,
+    progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Found<'py>> {
     let views = views_of(py, &masks, &cameras, names)?;
     let (sparse, size) = (rows(sparse, "sparse")?, vector::<3>(size, "size")?);
     let heading = heading_of(py, heading)?;
-    let BoxAlignment { vehicle_from_world, residual_m, confidence, views, .. } = pooled(py, threads, || {
-        to_box(&views, &sparse.iter().map(|&p| p.into()).collect::<Vec<_>>(), size, heading)
-    })?;
+    let BoxAlignment { vehicle_from_world, residual_m, confidence, views, .. } =
+        watched(py, threads, "align", progress, |watch| {
+            to_box_watched(
+                &views,
+                &sparse.iter().map(|&p| p.into()).collect::<Vec<_>>(),
+                size,
+                heading,
+                watch,
+            )
+        })?;
     Ok(found(py, &vehicle_from_world, residual_m, confidence, None, views))
 }
 
@@ -105,16 +116,19 @@ pub(crate) fn align_points<'py>(
 }
 
 #[pyfunction]
-#[pyo3(signature = (path, scan, heading, threads))]
+#[pyo3(signature = (path, scan, heading, threads, progress))]
 pub(crate) fn align_folder<'py>(
     py: Python<'py>,
     path: PathBuf,
     scan: Option<PathBuf>,
     heading: &str,
     threads: usize,
+    progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Found<'py>> {
     let heading = heading_of(py, heading)?;
-    let (_, found) = pooled(py, threads, || folder_to_scan(&path, scan.as_deref(), heading))?;
+    let (_, found) = watched(py, threads, "align", progress, |watch| {
+        folder_to_scan_watched(&path, scan.as_deref(), heading, watch)
+    })?;
     Ok(by_scan(py, &found))
 }
 

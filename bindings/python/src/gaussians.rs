@@ -4,6 +4,7 @@ use crate::arrays::{array, borrowed, owned, shape_text, similarity, values, vect
 use crate::camera::Camera;
 use crate::errors::{bad_type, bad_value, detached, from_library, pooled};
 use crate::renderer::chosen;
+use crate::watched::watched;
 use numpy::ndarray::ArrayView;
 use numpy::{Element, PyArray, PyArray1, PyArray2, PyArray3, PyArrayDescr, PyArrayDescrMethods};
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
@@ -13,9 +14,11 @@ use pyo3::types::{PyString, PyType};
 use std::path::PathBuf;
 use std::sync::{Arc, LazyLock};
 use vg::io::ply;
+use vg::progress::Watch;
 use vg::render::backend::{Trainer, trainer};
 use vg::render::{
-    Backend, Background, CpuRenderer, DepthMode, PictureGradient, RenderOptions, Rendered, Renderer,
+    Backend, Background, CpuRenderer, DepthMode, Differentiable, PictureGradient, RenderOptions, Rendered,
+    Renderer,
 };
 
 /// Draws for everybody: keeps its working memory, and the last lens, from picture to picture.
@@ -141,7 +144,8 @@ impl Gaussians {
         let options =
             RenderOptions { background, antialiased, near, far, sh_degree, ..RenderOptions::default() };
         let camera = &camera.get().inner;
-        let mut drawn = pooled(py, threads, || RENDERER.render(&self.inner, camera, &options))?;
+        let draw = |watch: &Watch| RENDERER.watched(watch).render(&self.inner, camera, &options);
+        let mut drawn = watched(py, threads, "render", None, draw)?;
         let size = (drawn.height as usize, drawn.width as usize);
         let picture = match (kind, background) {
             (Kind::Bytes, Background::Color(_)) => picture(py, size, drawn.to_rgb8()),
@@ -181,8 +185,11 @@ impl Gaussians {
             RenderOptions { antialiased, near, far, sh_degree, ..planes(py, background, depth_mode)? };
         let camera = &camera.get().inner;
         let device = device(py, backend)?;
-        let renderer = device.as_deref().unwrap_or(&*RENDERER);
-        let drawn = pooled(py, threads, || renderer.render(&self.inner, camera, &options))?;
+        let draw = |watch: &Watch| match &device {
+            Some(device) => device.render(&self.inner, camera, &options),
+            None => RENDERER.watched(watch).render(&self.inner, camera, &options),
+        };
+        let drawn = watched(py, threads, "render", None, draw)?;
         let size = (drawn.height as usize, drawn.width as usize);
         static PLANES: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         PLANES.import(py, "vehicle_gaussians._gradients", "Planes")?.call1((
@@ -233,8 +240,11 @@ impl Gaussians {
             depth: plane::<1>(depth, "depth", size)?,
         };
         let device = device(py, backend)?;
-        let renderer = device.as_deref().unwrap_or(&*RENDERER);
-        let g = pooled(py, threads, || renderer.backward(&self.inner, camera, &options, &gradient))?;
+        let back = |watch: &Watch| match &device {
+            Some(device) => device.backward(&self.inner, camera, &options, &gradient),
+            None => RENDERER.watched(watch).backward(&self.inner, camera, &options, &gradient),
+        };
+        let g = watched(py, threads, "render", None, back)?;
         let n = self.inner.len();
         let pose = [g.pose.rotation, g.pose.translation].map(|v| v.to_array()).concat();
         static GRADIENTS: PyOnceLock<Py<PyType>> = PyOnceLock::new();

@@ -15,6 +15,7 @@ mod model;
 mod reconstruct;
 mod renderer;
 mod scene;
+mod watched;
 
 use pyo3::prelude::*;
 

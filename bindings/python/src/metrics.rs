@@ -6,6 +6,7 @@ use crate::errors::{bad_value, from_library, pooled, renamed};
 use crate::gaussians::Gaussians;
 use crate::model::Model;
 use crate::reconstruct::{depth, mask, picture};
+use crate::watched::watched;
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 use vg::View;
@@ -64,8 +65,9 @@ pub(crate) fn view_errors(
     let view = View { name: String::new(), camera, image, mask, depth };
     let network = lpips.map(|model| model.get().inner.clone());
     let gaussians = &gaussians.get().inner;
-    pooled(py, threads, || {
-        let drawn = CpuRenderer::new().render(gaussians, &camera, &RenderOptions::default())?;
+    watched(py, threads, "measure", None, |watch| {
+        let drawn =
+            CpuRenderer::new().watched(watch).render(gaussians, &camera, &RenderOptions::default())?;
         let lpips = match network.map(Lpips::new).transpose()? {
             Some(lpips) => lpips.of(&drawn, &view)?,
             None => None,
@@ -93,8 +95,8 @@ pub(crate) fn surface_errors(
     let options = SurfaceOptions { f_score_m: f_score, ..SurfaceOptions::default() };
     options.validate().map_err(|e| from_library(py, e))?;
     let gaussians = &gaussians.get().inner;
-    let e = pooled(py, threads, || {
-        SurfaceErrors::with(gaussians, &points, &options).map_err(|e| renamed(e, "scan", "points"))
+    let e = watched(py, threads, "measure", None, |watch| {
+        SurfaceErrors::watched(gaussians, &points, &options, watch).map_err(|e| renamed(e, "scan", "points"))
     })?;
     Ok([
         e.accuracy_m,
