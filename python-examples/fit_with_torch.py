@@ -31,7 +31,7 @@ def main() -> None:
     wanted = [torch.from_numpy(car.render_planes(camera).color) for camera in cameras]
 
     torch.manual_seed(1)
-    means, rotations, scales, opacities, sh = (
+    means, quats, scales, opacities, sh = (
         torch.from_numpy(array.copy()) for array in (car.means, car.quats, car.scales, car.opacities, car.sh)
     )
     means += 0.01 * torch.randn_like(means)
@@ -41,14 +41,14 @@ def main() -> None:
         parameter.requires_grad_()
     for step in range(chosen.steps):
         i = step % len(cameras)
-        picture = render(means, rotations, scales, opacities, sh, cameras[i])
+        picture = render(means, quats, scales, opacities, sh, cameras[i])
         loss = (picture.color - wanted[i]).square().mean()
         adam.zero_grad()
         loss.backward()
         adam.step()
         if i == 0:
             print(f"step {step}: {-10 * torch.log10(loss).item():.2f} dB")
-    arrays = (tensor.detach().numpy() for tensor in (means, scales, rotations, opacities, sh))
+    arrays = (tensor.detach().numpy() for tensor in (means, scales, quats, opacities, sh))
     vg.Gaussians.from_arrays(*arrays).save_ply(chosen.output)
 
 

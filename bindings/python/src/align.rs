@@ -1,10 +1,11 @@
 //! From the world of a structure-from-motion model to the vehicle's frame; `vehicle_gaussians._align` names the numbers.
 
-use crate::arrays::{array, matrix4, numbers, owned, shape_text, values, vector};
+use crate::arrays::{floats, matrix4, numbers, owned, shape_text, values, vector};
 use crate::camera::Camera;
 use crate::errors::{bad_value, from_library, renamed};
 use crate::reconstruct::mask;
 use crate::watched::watched;
+use crate::whole;
 use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -31,10 +32,10 @@ pub(crate) fn align_scan<'py>(
     sparse: Option<&Bound<'py, PyAny>>,
     heading: &str,
     names: Option<Vec<String>>,
-    threads: usize,
+    #[pyo3(from_py_with = whole::threads)] threads: usize,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Found<'py>> {
-    let scan = array::<f32>(scan, "scan", "a NumPy array of float32, metres, (n, 3)")?;
+    let scan = floats(scan, "scan", "an array of floats, metres, (n, 3)")?;
     if !matches!(scan.shape(), [_, 3]) {
         return Err(bad_value(py, "scan", &shape_text(scan.shape()), "(n, 3)"));
     }
@@ -60,7 +61,7 @@ pub(crate) fn align_box<'py>(
     size: &Bound<'py, PyAny>,
     heading: &str,
     names: Option<Vec<String>>,
-    threads: usize,
+    #[pyo3(from_py_with = whole::threads)] threads: usize,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Found<'py>> {
     let views = views_of(py, &masks, &cameras, names)?;
@@ -122,7 +123,7 @@ pub(crate) fn align_folder<'py>(
     path: PathBuf,
     scan: Option<PathBuf>,
     heading: &str,
-    threads: usize,
+    #[pyo3(from_py_with = whole::threads)] threads: usize,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Found<'py>> {
     let heading = heading_of(py, heading)?;

@@ -7,6 +7,8 @@ use numpy::{
     PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyList, PyTuple, PyType};
 use vg::geometry::{Pose, Similarity};
 
 /// `object` as an array of `T` in row order, copied only if it lies in memory differently. The error names
@@ -35,6 +37,25 @@ pub(crate) fn array<'py, T: Element>(
     Ok(any.cast_into::<PyArray<T, _>>()?.try_readonly()?)
 }
 
+/// `object` as an array of float32. Floats of any precision are rounded; whole numbers are not taken from an array,
+/// where they are often of another unit, but from a list.
+pub(crate) fn floats<'py>(
+    object: &Bound<'py, PyAny>,
+    argument: &str,
+    allowed: &str,
+) -> PyResult<PyReadonlyArrayDyn<'py, f32>> {
+    let py = object.py();
+    let numpy = py.import("numpy")?;
+    if let Ok(any) = numpy.call_method1("asarray", (object,)) {
+        let kind = any.cast::<PyUntypedArray>()?.dtype().kind();
+        let is_list = object.is_instance_of::<PyList>() || object.is_instance_of::<PyTuple>();
+        if kind == b'f' || (is_list && matches!(kind, b'i' | b'u')) {
+            return array(&numpy.call_method1("asarray", (any, "float32"))?, argument, allowed);
+        }
+    }
+    array(object, argument, allowed)
+}
+
 /// The numbers of an array in row order.
 pub(crate) fn values<'a, T: Element>(array: &'a PyReadonlyArrayDyn<'_, T>) -> PyResult<&'a [T]> {
     Ok(array.as_slice()?)
@@ -56,8 +77,14 @@ pub(crate) fn numbers(
 ) -> PyResult<(Vec<usize>, Vec<f64>)> {
     let py = object.py();
     let found = || object.get_type().name().map_or_else(|_| "an object".into(), |n| n.to_string());
-    let as_float64 = py.import("numpy")?.call_method1("asarray", (object, "float64"));
-    let any = as_float64.map_err(|_| bad_type(argument, &found(), allowed))?;
+    // NumPy would read text as numbers, and drop the imaginary part of complex ones.
+    let is_real = |any: &Bound<'_, PyAny>| {
+        any.cast::<PyUntypedArray>().is_ok_and(|array| b"biufO".contains(&array.dtype().kind()))
+    };
+    let numpy = py.import("numpy")?;
+    let any = numpy.call_method1("asarray", (object,)).ok().filter(is_real);
+    let any = any.and_then(|any| numpy.call_method1("asarray", (any, "float64")).ok());
+    let any = any.ok_or_else(|| bad_type(argument, &found(), allowed))?;
     let array = array::<f64>(&any, argument, allowed)?;
     Ok((array.shape().to_vec(), values(&array)?.to_vec()))
 }
@@ -138,7 +165,7 @@ pub(crate) fn matrix4<'py>(py: Python<'py>, rows: &[f64]) -> Bound<'py, PyArray<
     owned(py, (4, 4), m)
 }
 
-/// A read-only array over memory of `owner`, which it keeps alive.
+/// A `vehicle_gaussians._frozen.FrozenArray` over memory of `owner`, which it keeps alive.
 ///
 /// # Safety
 /// `view` must look at memory that stays where it is, unchanged, as long as `owner` lives.
@@ -146,10 +173,12 @@ pub(crate) fn matrix4<'py>(py: Python<'py>, rows: &[f64]) -> Bound<'py, PyArray<
 pub(crate) unsafe fn borrowed<'py, T: Element, D: Dimension>(
     owner: Bound<'py, PyAny>,
     view: &ArrayView<'_, T, D>,
-) -> Bound<'py, PyArray<T, D>> {
+) -> PyResult<Bound<'py, PyArray<T, D>>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    let class = CLASS.import(owner.py(), "vehicle_gaussians._frozen", "FrozenArray")?.clone();
     // SAFETY: the caller's promise.
     let array = unsafe { PyArray::borrow_from_array(view, owner) };
     // Python cannot set the flag again: the array does not own its memory, and its owner offers no way to write.
     let array = array.readwrite().make_nonwriteable();
-    (*array).clone()
+    Ok(array.call_method1("view", (class,))?.cast_into()?)
 }

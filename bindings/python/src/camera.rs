@@ -2,13 +2,20 @@
 
 use crate::arrays::{matrix3, matrix4, numbers, owned, pose, pose_rows, shape_text, similarity, vector};
 use crate::errors::{bad_type, bad_value, from_library};
+use crate::parts::{self, CameraParts};
+use crate::whole;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use pyo3::types::PyString;
+use pyo3::types::{PyDict, PyString};
+use std::hash::{DefaultHasher, Hash, Hasher};
 use vg::Pose;
 use vg::geometry::{CameraModel, Distortion, Intrinsics, OpenCvModel, Similarity, frame};
 
 /// A posed camera. It does not change: methods return new ones.
+///
+///     >>> K = [[600, 0, 320], [0, 600, 240], [0, 0, 1]]
+///     >>> camera = Camera.from_matrix(K, vehicle_from_camera, width=640, height=480)
+///     >>> half = camera.scaled(320, 240)
 #[pyclass(module = "vehicle_gaussians", frozen, eq)]
 #[derive(Clone, PartialEq)]
 pub(crate) struct Camera {
@@ -20,12 +27,16 @@ impl Camera {
     /// From a COLMAP camera model, by name or number, and its parameters in COLMAP's order.
     ///
     /// vehicle_from_camera is a 3x4 or 4x4 rigid transform in metres; camera axes are x right, y down, z forward.
+    ///
+    ///     >>> camera = Camera.from_colmap("SIMPLE_RADIAL", 640, 480, [600, 320, 240, -0.05], vehicle_from_camera)
+    ///     >>> camera.model
+    ///     'OPENCV'
     #[staticmethod]
     #[pyo3(signature = (model, width, height, params, vehicle_from_camera))]
     fn from_colmap(
         model: &Bound<'_, PyAny>,
-        width: u32,
-        height: u32,
+        #[pyo3(from_py_with = whole::width)] width: u32,
+        #[pyo3(from_py_with = whole::height)] height: u32,
         params: &Bound<'_, PyAny>,
         vehicle_from_camera: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
@@ -45,14 +56,16 @@ impl Camera {
     ///
     /// The centre of the top-left pixel is (0.5, 0.5), as in COLMAP: a principal point in the middle is width / 2. For
     /// the K of OpenCV's calibration use from_opencv. distortion is k1, k2, p1, p2[, k3[, k4, k5, k6]].
+    ///
+    ///     >>> camera = Camera.from_matrix([[600, 0, 320], [0, 600, 240], [0, 0, 1]], vehicle_from_camera, 640, 480)
     #[staticmethod]
     #[pyo3(signature = (K, vehicle_from_camera, width, height, distortion=None))]
     #[expect(non_snake_case)]
     fn from_matrix(
         K: &Bound<'_, PyAny>,
         vehicle_from_camera: &Bound<'_, PyAny>,
-        width: u32,
-        height: u32,
+        #[pyo3(from_py_with = whole::width)] width: u32,
+        #[pyo3(from_py_with = whole::height)] height: u32,
         distortion: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let k = matrix3(K, "K")?;
@@ -65,14 +78,18 @@ impl Camera {
     /// principal point.
     ///
     /// distortion is that of cv2.calibrateCamera or, with fisheye=True, of cv2.fisheye.
+    ///
+    ///     >>> camera = Camera.from_opencv([[600, 0, 319.5], [0, 600, 239.5], [0, 0, 1]], vehicle_from_camera, 640, 480)
+    ///     >>> float(camera.K[0, 2])
+    ///     320.0
     #[staticmethod]
     #[pyo3(signature = (K, vehicle_from_camera, width, height, distortion=None, *, fisheye=false))]
     #[expect(non_snake_case)]
     fn from_opencv(
         K: &Bound<'_, PyAny>,
         vehicle_from_camera: &Bound<'_, PyAny>,
-        width: u32,
-        height: u32,
+        #[pyo3(from_py_with = whole::width)] width: u32,
+        #[pyo3(from_py_with = whole::height)] height: u32,
         distortion: Option<&Bound<'_, PyAny>>,
         fisheye: bool,
     ) -> PyResult<Self> {
@@ -89,20 +106,38 @@ impl Camera {
     }
 
     /// The same camera for pictures resized to width x height.
+    ///
+    ///     >>> half = camera.scaled(camera.width // 2, camera.height // 2)
     #[pyo3(signature = (width, height))]
-    fn scaled(&self, py: Python<'_>, width: u32, height: u32) -> PyResult<Self> {
+    fn scaled(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = whole::width)] width: u32,
+        #[pyo3(from_py_with = whole::height)] height: u32,
+    ) -> PyResult<Self> {
         let resized = self.inner.resized(width, height).map_err(|e| from_library(py, e))?;
         Ok(Self { inner: resized })
     }
 
     /// The camera of the part image[y : y + height, x : x + width] of its pictures.
+    ///
+    ///     >>> part = camera.cropped(x=100, y=50, width=64, height=32)  # of image[50:82, 100:164]
     #[pyo3(signature = (x, y, width, height))]
-    fn cropped(&self, py: Python<'_>, x: u32, y: u32, width: u32, height: u32) -> PyResult<Self> {
+    fn cropped(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = whole::x)] x: u32,
+        #[pyo3(from_py_with = whole::y)] y: u32,
+        #[pyo3(from_py_with = whole::width)] width: u32,
+        #[pyo3(from_py_with = whole::height)] height: u32,
+    ) -> PyResult<Self> {
         let part = self.inner.cropped(x, y, width, height).map_err(|e| from_library(py, e))?;
         Ok(Self { inner: part })
     }
 
     /// The same camera, lens included, in another place.
+    ///
+    ///     >>> moved = camera.with_pose(other_vehicle_from_camera)
     #[pyo3(signature = (vehicle_from_camera))]
     fn with_pose(&self, vehicle_from_camera: &Bound<'_, PyAny>) -> PyResult<Self> {
         let vehicle_from_camera = pose(vehicle_from_camera, "vehicle_from_camera")?;
@@ -144,6 +179,30 @@ impl Camera {
     #[getter]
     fn params<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_vec(py, self.colmap().1)
+    }
+
+    /// Parts for pickle: the camera comes back to the last bit.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, CameraParts)> {
+        let (model, params) = self.colmap();
+        let pose = self.inner.vehicle_from_camera.to_row_major();
+        let parts = (model.name(), self.inner.width, self.inner.height, params, pose);
+        Ok((parts::function(py, "_camera")?, parts))
+    }
+
+    fn __copy__(this: Bound<'_, Self>) -> Bound<'_, Self> {
+        this
+    }
+
+    fn __deepcopy__<'py>(this: Bound<'py, Self>, _memo: &Bound<'py, PyDict>) -> Bound<'py, Self> {
+        this
+    }
+
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        (self.inner.width, self.inner.height).hash(&mut hasher);
+        // Adding 0 makes one of both zeros, which are equal.
+        self.inner.center().to_array().map(|c| (c + 0.0).to_bits()).hash(&mut hasher);
+        hasher.finish()
     }
 
     fn __repr__(&self) -> String {
@@ -201,6 +260,8 @@ fn camera_model(model: &Bound<'_, PyAny>) -> PyResult<CameraModel> {
 ///
 /// vehicle_from_world is the similarity (4x4) from the model's world to the vehicle's frame; without, they are one.
 /// pycolmap keeps quaternions as (x, y, z, w).
+///
+///     >>> vehicle_from_camera = pose_from_colmap([1, 0, 0, 0], [0, 0, 5], vehicle_from_world)
 #[pyfunction]
 #[pyo3(signature = (qvec, tvec, vehicle_from_world=None))]
 pub(crate) fn pose_from_colmap<'py>(
@@ -217,6 +278,8 @@ pub(crate) fn pose_from_colmap<'py>(
 /// nerfstudio's transforms.json and in Blender.
 ///
 /// vehicle_from_world is the similarity (4x4) from that world to the vehicle's frame; without, they are one.
+///
+///     >>> vehicle_from_camera = pose_from_opengl(frame["transform_matrix"])
 #[pyfunction]
 #[pyo3(signature = (camera_to_world, vehicle_from_world=None))]
 pub(crate) fn pose_from_opengl<'py>(
@@ -231,6 +294,8 @@ pub(crate) fn pose_from_opengl<'py>(
 /// vehicle_from_camera (4x4) of a vehicle that was tracked as a box: the poses (3x4 or 4x4, metres) of the box and of
 /// the camera in one frame (ego, map, UTM) at the moment of the picture. The box's axes are x forward, y left, z up, and
 /// its origin lies on the vehicle's plane of symmetry.
+///
+///     >>> vehicle_from_camera = pose_from_box(ego_from_vehicle, ego_from_camera)
 #[pyfunction]
 #[pyo3(signature = (ego_from_vehicle, ego_from_camera))]
 pub(crate) fn pose_from_box<'py>(
@@ -256,6 +321,8 @@ fn in_vehicle_frame<'py>(
 
 /// The similarity (4x4) that best takes points onto points, both (n, 3) with n >= 3 (Umeyama 1991): for example
 /// vehicle_from_world from camera centres that are known in both frames.
+///
+///     >>> vehicle_from_world = similarity_from_points(centers_in_world, centers_in_vehicle)
 #[pyfunction]
 #[pyo3(signature = (source, target))]
 pub(crate) fn similarity_from_points<'py>(

@@ -1,6 +1,5 @@
 //! The way out of the GIL and back: errors become `VgError`, and so do panics.
 
-use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
@@ -14,11 +13,13 @@ use vg::progress::Threads;
 /// Text and place of the last panic, for the message that its payload alone cannot give.
 static LAST_PANIC: Mutex<Option<(String, String)>> = Mutex::new(None);
 
-/// A `vehicle_gaussians.VgError`.
+/// A `vehicle_gaussians.VgError`, of the subclass that is its status's.
 pub(crate) fn vg_error(py: Python<'_>, status: Status, message: impl Into<String>) -> PyErr {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-    match CLASS.import(py, "vehicle_gaussians._errors", "VgError") {
-        Ok(class) => PyErr::from_type(class.clone(), (status as i32, message.into())),
+    // Made here and not by PyErr::from_type, whose error would have the class that was asked for.
+    let class = CLASS.import(py, "vehicle_gaussians._errors", "VgError");
+    match class.and_then(|class| class.call1((status as i32, message.into()))) {
+        Ok(error) => PyErr::from_value(error),
         Err(error) => error,
     }
 }
@@ -30,7 +31,12 @@ pub(crate) fn bad_value(py: Python<'_>, argument: &str, found: &str, allowed: &s
 
 /// An argument of the wrong kind.
 pub(crate) fn bad_type(argument: &str, found: &str, allowed: &str) -> PyErr {
-    PyTypeError::new_err(format!("{argument}: {found}; allowed: {allowed}"))
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    let message = format!("{argument}: {found}; allowed: {allowed}");
+    Python::attach(|py| match CLASS.import(py, "vehicle_gaussians._errors", "ArgumentTypeError") {
+        Ok(class) => PyErr::from_type(class.clone(), (Status::Argument as i32, message)),
+        Err(error) => error,
+    })
 }
 
 /// The error of a function that calls its argument `from`, for callers who know it as `to`.

@@ -1,16 +1,19 @@
 //! `Gaussians`: read-only arrays over the library's memory, pictures, and PLY files.
 
-use crate::arrays::{array, borrowed, owned, shape_text, similarity, values, vector};
+use crate::arrays::{borrowed, floats, owned, shape_text, similarity, values, vector};
 use crate::camera::Camera;
 use crate::errors::{bad_type, bad_value, detached, from_library, pooled};
+use crate::parts;
 use crate::renderer::chosen;
 use crate::watched::watched;
+use crate::whole;
+use numpy::PyUntypedArrayMethods;
 use numpy::ndarray::ArrayView;
 use numpy::{Element, PyArray, PyArray1, PyArray2, PyArray3, PyArrayDescr, PyArrayDescrMethods};
-use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyString, PyType};
+use pyo3::types::{PyDict, PyString, PyType};
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
 use std::sync::{Arc, LazyLock};
 use vg::io::ply;
@@ -26,7 +29,14 @@ static RENDERER: LazyLock<CpuRenderer> = LazyLock::new(CpuRenderer::new);
 
 /// The Gaussians of a vehicle, in its frame (x forward, y left, z up, metres). They do not change: methods return
 /// new ones, and the arrays are read-only views that keep them alive.
-#[pyclass(module = "vehicle_gaussians", frozen)]
+///
+///     >>> car = Gaussians.load_ply("car.ply")
+///     >>> picture = car.render(camera)
+///     >>> red = car.sh.copy()
+///     >>> red[:, 0] = [1.77, -1.77, -1.77]
+///     >>> car = Gaussians.from_arrays(car.means, car.scales, car.quats, car.opacities, red)
+#[pyclass(module = "vehicle_gaussians", frozen, eq)]
+#[derive(PartialEq)]
 pub(crate) struct Gaussians {
     /// Shared with the renderers that were made of them.
     pub(crate) inner: Arc<vg::Gaussians>,
@@ -42,6 +52,10 @@ impl Gaussians {
 impl Gaussians {
     /// From float32 arrays of n Gaussians: means (n, 3) and scales (n, 3), standard deviations, in metres; quats
     /// (n, 4) as (w, x, y, z) of any norm; opacities (n,) from 0 to 1; sh (n, (degree + 1)^2, 3).
+    ///
+    ///     >>> means, scales, quats = np.zeros((2, 3)), np.full((2, 3), 0.1), np.tile([1.0, 0, 0, 0], (2, 1))
+    ///     >>> Gaussians.from_arrays(means, scales, quats, opacities=np.ones(2), sh=np.zeros((2, 1, 3)))
+    ///     Gaussians(2, sh_degree=0)
     #[staticmethod]
     #[pyo3(signature = (means, scales, quats, opacities, sh))]
     fn from_arrays(
@@ -52,7 +66,7 @@ impl Gaussians {
         sh: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
         let py = means.py();
-        let sh = floats(sh, "sh")?;
+        let sh = floats(sh, "sh", FLOATS)?;
         let sh_degree = match sh.shape() {
             [_, 1, 3] => 0,
             [_, 4, 3] => 1,
@@ -62,7 +76,7 @@ impl Gaussians {
                 return Err(bad_value(py, "sh", &shape_text(other), "(n, K, 3) with K = 1, 4, 9 or 16"));
             }
         };
-        let opacities = floats(opacities, "opacities")?;
+        let opacities = floats(opacities, "opacities", FLOATS)?;
         if opacities.shape().len() != 1 {
             return Err(bad_value(py, "opacities", &shape_text(opacities.shape()), "(n,)"));
         }
@@ -79,6 +93,8 @@ impl Gaussians {
     }
 
     /// Reads a PLY file in the layout of 3D Gaussian Splatting.
+    ///
+    ///     >>> car = Gaussians.load_ply("car.ply")
     #[staticmethod]
     #[pyo3(signature = (path))]
     fn load_ply(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
@@ -88,12 +104,17 @@ impl Gaussians {
 
     /// Writes a PLY file in the layout of 3D Gaussian Splatting. A file that is there is replaced only once the new
     /// one is complete.
+    ///
+    ///     >>> car.save_ply("copy.ply")
     #[pyo3(signature = (path))]
     fn save_ply(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         pooled(py, 1, || ply::write(&path, &self.inner))
     }
 
     /// The mirror image across the plane of symmetry, y = 0.
+    ///
+    ///     >>> car.mirrored().mirrored() == car
+    ///     True
     #[pyo3(signature = ())]
     fn mirrored(&self, py: Python<'_>) -> PyResult<Self> {
         pooled(py, 1, || Ok(self.inner.mirrored())).map(Self::of)
@@ -101,6 +122,8 @@ impl Gaussians {
 
     /// These in another frame: to_from_vehicle is a 4x4 similarity. Colours turn with the vehicle. Coordinates must stay
     /// below 16384 m, where a float32 still holds a millimetre.
+    ///
+    ///     >>> twice_as_large = car.transformed(np.diag([2.0, 2.0, 2.0, 1.0]))
     #[pyo3(signature = (to_from_vehicle))]
     fn transformed(&self, to_from_vehicle: &Bound<'_, PyAny>) -> PyResult<Self> {
         let similarity = similarity(to_from_vehicle, "to_from_vehicle")?;
@@ -109,6 +132,10 @@ impl Gaussians {
     }
 
     /// These, then those of other, at the higher of their degrees of spherical harmonics.
+    ///
+    ///     >>> both = car.merged(car.mirrored())
+    ///     >>> len(both) == 2 * len(car)
+    ///     True
     #[pyo3(signature = (other))]
     fn merged(&self, py: Python<'_>, other: &Bound<'_, Self>) -> PyResult<Self> {
         let other = &other.get().inner;
@@ -121,6 +148,9 @@ impl Gaussians {
     ///
     /// background is "white", "black", "transparent" or (r, g, b) from 0 to 1; near and far are metres; sh_degree leaves
     /// out the colour's bands above it; threads=0 means one per core.
+    ///
+    ///     >>> picture = car.render(camera)
+    ///     >>> rgba, depth = car.render(camera, "transparent", depth=True)
     #[pyo3(signature = (
         camera, background=None, depth=false, threads=0, *,
         dtype=None, antialiased=false, near=0.01, far=1e10, sh_degree=3
@@ -132,12 +162,12 @@ impl Gaussians {
         camera: &Bound<'py, Camera>,
         background: Option<&Bound<'py, PyAny>>,
         depth: bool,
-        threads: usize,
+        #[pyo3(from_py_with = whole::threads)] threads: usize,
         dtype: Option<&Bound<'py, PyAny>>,
         antialiased: bool,
         near: f32,
         far: f32,
-        sh_degree: u8,
+        #[pyo3(from_py_with = whole::sh_degree)] sh_degree: u8,
     ) -> PyResult<Bound<'py, PyAny>> {
         let background = background.map_or(Ok(Background::Color([1.0; 3])), parse_background)?;
         let kind = dtype.map_or(Ok(Kind::Bytes), Kind::of)?;
@@ -163,6 +193,8 @@ impl Gaussians {
     /// "transparent" one, premultiplied; alpha and depth (height, width). All float32; arguments as those of render,
     /// and depth_mode, "expected" or "accumulated": depth times alpha. backend is "cpu", "gpu", an error without, or
     /// "auto", the CPU: Renderer is for Gaussians that are drawn many times.
+    ///
+    ///     >>> color, alpha, depth = car.render_planes(camera, "black")
     #[pyo3(signature = (
         camera, background=None, threads=0, *,
         antialiased=false, near=0.01, far=1e10, sh_degree=3, depth_mode="expected", backend="auto"
@@ -173,11 +205,11 @@ impl Gaussians {
         py: Python<'py>,
         camera: &Bound<'py, Camera>,
         background: Option<&Bound<'py, PyAny>>,
-        threads: usize,
+        #[pyo3(from_py_with = whole::threads)] threads: usize,
         antialiased: bool,
         near: f32,
         far: f32,
-        sh_degree: u8,
+        #[pyo3(from_py_with = whole::sh_degree)] sh_degree: u8,
         depth_mode: &str,
         backend: &str,
     ) -> PyResult<Bound<'py, PyAny>> {
@@ -204,6 +236,11 @@ impl Gaussians {
     /// float32, finite; None where the loss does not look. The picture is drawn again on the way.
     ///
     /// Constants are the order of depth, the pixels a Gaussian reaches, what is too faint to be drawn, near and far.
+    ///
+    ///     >>> planes = car.render_planes(camera)
+    ///     >>> gradients = car.render_backward(camera, color=2 * (planes.color - photograph))
+    ///     >>> gradients.means.shape == car.means.shape
+    ///     True
     #[pyo3(signature = (
         camera, color=None, alpha=None, depth=None, background=None, threads=0, *,
         antialiased=false, near=0.01, far=1e10, sh_degree=3, depth_mode="expected", backend="auto"
@@ -217,11 +254,11 @@ impl Gaussians {
         alpha: Option<&Bound<'py, PyAny>>,
         depth: Option<&Bound<'py, PyAny>>,
         background: Option<&Bound<'py, PyAny>>,
-        threads: usize,
+        #[pyo3(from_py_with = whole::threads)] threads: usize,
         antialiased: bool,
         near: f32,
         far: f32,
-        sh_degree: u8,
+        #[pyo3(from_py_with = whole::sh_degree)] sh_degree: u8,
         depth_mode: &str,
         backend: &str,
     ) -> PyResult<Bound<'py, PyAny>> {
@@ -262,32 +299,32 @@ impl Gaussians {
 
     /// Centres, metres. (n, 3)
     #[getter]
-    fn means<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray2<f32>> {
+    fn means<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         view(this, (this.get().inner.len(), 3), this.get().inner.means().as_flattened())
     }
 
     /// Standard deviations along the Gaussians' own axes, metres. (n, 3)
     #[getter]
-    fn scales<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray2<f32>> {
+    fn scales<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         view(this, (this.get().inner.len(), 3), this.get().inner.scales().as_flattened())
     }
 
     /// vehicle_from_gaussian, unit quaternions (w, x, y, z). (n, 4)
     #[getter]
-    fn quats<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray2<f32>> {
+    fn quats<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         view(this, (this.get().inner.len(), 4), this.get().inner.rotations().as_flattened())
     }
 
     /// Peak opacities, 0 to 1. (n,)
     #[getter]
-    fn opacities<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray1<f32>> {
+    fn opacities<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f32>>> {
         view(this, this.get().inner.len(), this.get().inner.opacities())
     }
 
     /// Spherical harmonics in the order and with the signs of 3D Gaussian Splatting, RGB last:
     /// colour = 0.5 + sum of coefficient times basis. (n, (degree + 1)^2, 3)
     #[getter]
-    fn sh<'py>(this: &Bound<'py, Self>) -> Bound<'py, PyArray3<f32>> {
+    fn sh<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let g = &this.get().inner;
         view(this, (g.len(), g.sh_stride() / 3, 3), g.sh())
     }
@@ -305,6 +342,34 @@ impl Gaussians {
         Some(owned(py, (2, 3), [low, high].concat()))
     }
 
+    /// Parts for pickle: the arrays, which come back to the last bit.
+    fn __reduce__<'py>(this: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Arrays<'py>)> {
+        let arrays = (
+            Self::means(this)?,
+            Self::scales(this)?,
+            Self::quats(this)?,
+            Self::opacities(this)?,
+            Self::sh(this)?,
+        );
+        Ok((parts::function(this.py(), "_gaussians")?, arrays))
+    }
+
+    fn __copy__(this: Bound<'_, Self>) -> Bound<'_, Self> {
+        this
+    }
+
+    fn __deepcopy__<'py>(this: Bound<'py, Self>, _memo: &Bound<'py, PyDict>) -> Bound<'py, Self> {
+        this
+    }
+
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        (self.inner.len(), self.inner.sh_degree()).hash(&mut hasher);
+        // Adding 0 makes one of both zeros, which are equal.
+        self.inner.means().first().map(|mean| mean.map(|c| (c + 0.0).to_bits())).hash(&mut hasher);
+        hasher.finish()
+    }
+
     fn __len__(&self) -> usize {
         self.inner.len()
     }
@@ -314,12 +379,34 @@ impl Gaussians {
     }
 }
 
+/// Means, scales, quaternions, opacities, spherical harmonics.
+type Arrays<'py> = (
+    Bound<'py, PyArray2<f32>>,
+    Bound<'py, PyArray2<f32>>,
+    Bound<'py, PyArray2<f32>>,
+    Bound<'py, PyArray1<f32>>,
+    Bound<'py, PyArray3<f32>>,
+);
+
+/// Gaussians of the parts that `Gaussians.__reduce__` gives.
+#[pyfunction]
+#[pyo3(name = "_gaussians")]
+pub(crate) fn of_arrays(
+    means: &Bound<'_, PyAny>,
+    scales: &Bound<'_, PyAny>,
+    quats: &Bound<'_, PyAny>,
+    opacities: &Bound<'_, PyAny>,
+    sh: &Bound<'_, PyAny>,
+) -> PyResult<Gaussians> {
+    Gaussians::from_arrays(means, scales, quats, opacities, sh)
+}
+
 /// A read-only array over memory of the Gaussians.
 fn view<'py, T: Element, D: numpy::ndarray::IntoDimension>(
     owner: &Bound<'py, Gaussians>,
     shape: D,
     values: &[T],
-) -> Bound<'py, PyArray<T, D::Dim>> {
+) -> PyResult<Bound<'py, PyArray<T, D::Dim>>> {
     let view = ArrayView::from_shape(shape.into_dimension(), values).expect("as many values as the shape");
     // SAFETY: the class is frozen and never touches its arrays, so that they stay as they are while it lives.
     #[expect(unsafe_code)]
@@ -328,13 +415,12 @@ fn view<'py, T: Element, D: numpy::ndarray::IntoDimension>(
     }
 }
 
-fn floats<'py>(object: &Bound<'py, PyAny>, argument: &str) -> PyResult<PyReadonlyArrayDyn<'py, f32>> {
-    array::<f32>(object, argument, "an array of float32")
-}
+/// Arrays of Gaussians and of planes.
+const FLOATS: &str = "an array of floats";
 
 /// An (n, N) array of float32.
 fn rows<const N: usize>(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<Vec<[f32; N]>> {
-    let array = floats(object, argument)?;
+    let array = floats(object, argument, FLOATS)?;
     match array.shape() {
         [_, n] if *n == N => Ok(values(&array)?.as_chunks::<N>().0.to_vec()),
         other => Err(bad_value(object.py(), argument, &shape_text(other), &format!("(n, {N})"))),
@@ -387,7 +473,7 @@ fn plane<const N: usize>(
 ) -> PyResult<Vec<f32>> {
     let Some(object) = object else { return Ok(vec![]) };
     let py = object.py();
-    let array = floats(object, argument)?;
+    let array = floats(object, argument, FLOATS)?;
     let (fits, allowed) = match N {
         1 => (array.shape() == [height, width], format!("({height}, {width})")),
         _ => (array.shape() == [height, width, N], format!("({height}, {width}, {N})")),

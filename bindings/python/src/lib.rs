@@ -12,10 +12,12 @@ mod errors;
 mod gaussians;
 mod metrics;
 mod model;
+mod parts;
 mod reconstruct;
 mod renderer;
 mod scene;
 mod watched;
+mod whole;
 
 use pyo3::prelude::*;
 
@@ -28,11 +30,13 @@ mod _native {
     #[pymodule_export]
     use crate::errors::panic_on_a_worker_thread;
     #[pymodule_export]
-    use crate::gaussians::Gaussians;
+    use crate::gaussians::{Gaussians, of_arrays};
     #[pymodule_export]
     use crate::metrics::{picture_errors, surface_errors, view_errors};
     #[pymodule_export]
     use crate::model::{Model, segment};
+    #[pymodule_export]
+    use crate::parts::camera;
     #[pymodule_export]
     use crate::reconstruct::reconstruct;
     #[pymodule_export]

@@ -1,12 +1,13 @@
 //! How far a model is from photographs and from a scan; `vehicle_gaussians._metrics` names the numbers.
 
-use crate::arrays::{array, shape_text, values};
+use crate::arrays::{array, floats, shape_text, values};
 use crate::camera::Camera;
 use crate::errors::{bad_value, from_library, pooled, renamed};
 use crate::gaussians::Gaussians;
 use crate::model::Model;
 use crate::reconstruct::{depth, mask, picture};
 use crate::watched::watched;
+use crate::whole;
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 use vg::View;
@@ -21,7 +22,7 @@ pub(crate) fn picture_errors(
     a: &Bound<'_, PyAny>,
     b: &Bound<'_, PyAny>,
     lpips: Option<&Bound<'_, Model>>,
-    threads: usize,
+    #[pyo3(from_py_with = whole::threads)] threads: usize,
 ) -> PyResult<(f64, Option<f64>, Option<f64>)> {
     let ((a, size), (b, other)) = (on_white(a, "a")?, on_white(b, "b")?);
     if other != size {
@@ -53,7 +54,7 @@ pub(crate) fn view_errors(
     camera: &Bound<'_, Camera>,
     depth: Option<&Bound<'_, PyAny>>,
     lpips: Option<&Bound<'_, Model>>,
-    threads: usize,
+    #[pyo3(from_py_with = whole::threads)] threads: usize,
 ) -> PyResult<OfView> {
     let camera = camera.get().inner;
     let (image, cut_out) = picture(image, "image", &camera)?;
@@ -84,9 +85,9 @@ pub(crate) fn surface_errors(
     gaussians: &Bound<'_, Gaussians>,
     points: &Bound<'_, PyAny>,
     f_score: f64,
-    threads: usize,
+    #[pyo3(from_py_with = whole::threads)] threads: usize,
 ) -> PyResult<[f64; 9]> {
-    let points = array::<f32>(points, "points", "a NumPy array of float32, metres, (n, 3)")?;
+    let points = floats(points, "points", "an array of floats, metres, (n, 3)")?;
     if !matches!(points.shape(), [_, 3]) {
         return Err(bad_value(py, "points", &shape_text(points.shape()), "(n, 3)"));
     }
@@ -113,14 +114,14 @@ pub(crate) fn surface_errors(
 
 /// A picture as it looks on white, RGB in [0, 1], and its height and width.
 fn on_white(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<(Vec<[f32; 3]>, [u32; 2])> {
-    const ALLOWED: &str = "a NumPy array of uint8 or float32, (height, width, 3) or (height, width, 4)";
+    const ALLOWED: &str = "a NumPy array of uint8 or floats, (height, width, 3) or (height, width, 4)";
     let floats: Vec<f32>;
     let shape: Vec<usize>;
     if let Ok(bytes) = array::<u8>(object, argument, ALLOWED) {
         floats = values(&bytes)?.iter().map(|b| f32::from(*b) / 255.0).collect();
         shape = bytes.shape().to_vec();
     } else {
-        let array = array::<f32>(object, argument, ALLOWED)?;
+        let array = self::floats(object, argument, ALLOWED)?;
         (floats, shape) = (values(&array)?.to_vec(), array.shape().to_vec());
     }
     if let Some(bad) = floats.iter().find(|v| !v.is_finite()) {

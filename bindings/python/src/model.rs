@@ -3,7 +3,9 @@
 use crate::arrays::owned;
 use crate::camera::Camera;
 use crate::errors::{bad_value, detached, pooled};
+use crate::parts::stays_here;
 use crate::reconstruct::picture;
+use crate::whole;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -15,6 +17,9 @@ use vg::scene::mask::Label;
 ///
 /// It is opened once and may be used by any number of threads at a time; runs of it take turns. It holds its weights
 /// and threads until nobody refers to it any more. Not for a forked process.
+///
+///     >>> network = Model("depth.onnx")  # doctest: +SKIP
+///     >>> made = reconstruct(images, masks, cameras, prior="onnx", prior_model=network)  # doctest: +SKIP
 #[pyclass(module = "vehicle_gaussians", frozen)]
 pub(crate) struct Model {
     pub(crate) inner: vg::onnx::Model,
@@ -40,7 +45,7 @@ impl Model {
         runtime: Option<PathBuf>,
         provider: &str,
         fall_back: bool,
-        threads: usize,
+        #[pyo3(from_py_with = whole::threads)] threads: usize,
         prepack: Option<bool>,
         arena: bool,
     ) -> PyResult<Self> {
@@ -60,6 +65,11 @@ impl Model {
         self.inner.path().to_owned()
     }
 
+    fn __reduce__(&self) -> PyResult<()> {
+        let way_out = "another process opens its file again: Model(path)";
+        Err(stays_here("Model", "a network that is open in this process", way_out))
+    }
+
     fn __repr__(&self) -> String {
         format!("Model({:?})", self.inner.path())
     }
@@ -70,6 +80,8 @@ impl Model {
 ///
 /// image: RGB, uint8 (height, width, 3); with a fourth channel, alpha is not looked at.
 /// threads: worker threads; 0 means one per core.
+///
+///     >>> mask = segment(Model("segmentation.onnx"), images[0], cameras[0])  # doctest: +SKIP
 #[pyfunction]
 #[pyo3(signature = (model, image, camera, threads=0))]
 pub(crate) fn segment<'py>(
@@ -77,7 +89,7 @@ pub(crate) fn segment<'py>(
     model: &Bound<'py, Model>,
     image: &Bound<'py, PyAny>,
     camera: &Bound<'py, Camera>,
-    threads: usize,
+    #[pyo3(from_py_with = whole::threads)] threads: usize,
 ) -> PyResult<Bound<'py, PyArray2<bool>>> {
     let (model, camera) = (model.get().inner.clone(), camera.get().inner);
     let (image, _) = picture(image, "image", &camera)?;

@@ -1,12 +1,13 @@
 //! Photographs in memory to Gaussians.
 
-use crate::arrays::{array, owned, shape_text, values};
+use crate::arrays::{array, floats, owned, shape_text, values, vector};
 use crate::camera::Camera;
 use crate::errors::{bad_type, bad_value, detached, from_library};
 use crate::gaussians::Gaussians;
 use crate::model::Model;
 use crate::renderer::chosen;
 use crate::watched::Teller;
+use crate::whole;
 use numpy::{PyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -45,19 +46,19 @@ pub(crate) fn reconstruct<'py>(
     relight: &str,
     photo: bool,
     cloud: Option<&Bound<'py, PyAny>>,
-    vehicle_size: Option<[f64; 3]>,
-    sh_degree: u8,
+    vehicle_size: Option<Bound<'py, PyAny>>,
+    #[pyo3(from_py_with = whole::sh_degree)] sh_degree: u8,
     keep: Vec<String>,
     check: bool,
     points: bool,
     budget: Option<f64>,
     resolution: f64,
-    max_views: Option<usize>,
-    refine_iterations: Option<u32>,
+    #[pyo3(from_py_with = whole::max_views)] max_views: Option<usize>,
+    #[pyo3(from_py_with = whole::refine_iterations)] refine_iterations: Option<u32>,
     refine_seconds: Option<f64>,
     refine_hold_out: bool,
     refine_backend: &str,
-    threads: usize,
+    #[pyo3(from_py_with = whole::threads)] threads: usize,
     names: Option<Vec<String>>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Gaussians, String, Option<Points<'py>>)> {
@@ -68,7 +69,7 @@ pub(crate) fn reconstruct<'py>(
         calibrate: parse_calibrate(py, calibrate)?,
         symmetry: parse_symmetry(py, symmetry)?,
         relight: parse_relight(py, relight)?,
-        vehicle_size,
+        vehicle_size: vehicle_size.map(|size| vector::<3>(&size, "vehicle_size")).transpose()?,
         sh_degree,
         keep: parse_keep(py, &keep)?,
         check,
@@ -187,8 +188,9 @@ pub(crate) fn picture(
     camera: &vg::Camera,
 ) -> PyResult<(RgbImage, Option<Mask>)> {
     let py = object.py();
-    let pixels =
-        array::<u8>(object, argument, "a NumPy array of uint8, (height, width, 3) or (height, width, 4)")?;
+    let allowed = "a NumPy array of uint8, (height, width, 3) or (height, width, 4); floats of 0 to 1 become one by \
+                   (255 * image).round().astype(np.uint8)";
+    let pixels = array::<u8>(object, argument, allowed)?;
     let (width, height) = (camera.width, camera.height);
     let format = match pixels.shape() {
         [h, w, 3] if (*h, *w) == (height as usize, width as usize) => PixelFormat::Rgb8,
@@ -213,7 +215,8 @@ pub(crate) fn picture(
 
 pub(crate) fn mask(object: &Bound<'_, PyAny>, argument: &str, camera: &vg::Camera) -> PyResult<Mask> {
     let py = object.py();
-    let allowed = "a NumPy array of bool, or of uint8 where 128 and above is vehicle, (height, width)";
+    let allowed = "a NumPy array of bool, or of uint8 where 128 and above is vehicle, (height, width); others become one \
+                   by a comparison: mask > 0.5";
     // Of one byte each, 0 or 1.
     let is_bool = object.cast::<PyUntypedArray>().is_ok_and(|a| numpy_is_bool(py, a));
     let labels: Vec<u8>;
@@ -245,7 +248,9 @@ fn numpy_is_bool(py: Python<'_>, array: &Bound<'_, PyUntypedArray>) -> bool {
 
 pub(crate) fn depth(object: &Bound<'_, PyAny>, argument: &str, camera: &vg::Camera) -> PyResult<DepthMap> {
     let py = object.py();
-    let metres = array::<f32>(object, argument, "a NumPy array of float32, metres, (height, width)")?;
+    let allowed = "an array of floats, metres, (height, width); millimetres become one by \
+                   depth.astype(np.float32) / 1000";
+    let metres = floats(object, argument, allowed)?;
     same_size(py, argument, metres.shape(), camera)?;
     let stride = camera.width as usize;
     DepthMap::from_strided(argument, values(&metres)?, camera.width, camera.height, stride)
@@ -255,7 +260,7 @@ pub(crate) fn depth(object: &Bound<'_, PyAny>, argument: &str, camera: &vg::Came
 /// A copy of the points; none if there are none.
 fn cloud(object: &Bound<'_, PyAny>) -> PyResult<Option<Cloud>> {
     let py = object.py();
-    let points = array::<f32>(object, "cloud", "a NumPy array of float32, metres, (n, 3)")?;
+    let points = floats(object, "cloud", "an array of floats, metres, (n, 3)")?;
     if !matches!(points.shape(), [_, 3]) {
         return Err(bad_value(py, "cloud", &shape_text(points.shape()), "(n, 3)"));
     }

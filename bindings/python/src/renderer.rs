@@ -3,7 +3,9 @@
 use crate::camera::Camera;
 use crate::errors::{bad_value, detached};
 use crate::gaussians::{Gaussians, parse_background, picture};
+use crate::parts::stays_here;
 use crate::watched::watched;
+use crate::whole;
 use pyo3::prelude::*;
 use std::sync::Arc;
 use vg::render::{AssetRenderer, Backend, Background, RenderOptions, Rgba8};
@@ -11,6 +13,9 @@ use vg::render::{AssetRenderer, Backend, Background, RenderOptions, Rgba8};
 /// Gaussians made ready to be drawn many times. backend is "auto", a graphics processor where this build and this
 /// machine have one and there are 20,000 Gaussians or more, else the CPU; "cpu"; or "gpu", an error without. Under
 /// "auto" the CPU goes on should the device fail.
+///
+///     >>> ready = Renderer(car, "cpu")
+///     >>> pictures = [ready.render(camera) for camera in cameras]
 #[pyclass(module = "vehicle_gaussians", frozen)]
 pub(crate) struct Renderer {
     ready: AssetRenderer,
@@ -41,6 +46,8 @@ impl Renderer {
 
     /// The picture a camera takes: uint8 (height, width, 3), or (height, width, 4) with straight alpha on a
     /// "transparent" background. Arguments are those of Gaussians.render.
+    ///
+    ///     >>> picture = Renderer(car).render(camera, "transparent")
     #[pyo3(signature = (
         camera, background=None, threads=0, *, antialiased=false, near=0.01, far=1e10, sh_degree=3
     ), text_signature = "(self, camera, background='white', threads=0, *, antialiased=False, near=0.01, far=1e10, \
@@ -50,11 +57,11 @@ impl Renderer {
         py: Python<'py>,
         camera: &Bound<'py, Camera>,
         background: Option<&Bound<'py, PyAny>>,
-        threads: usize,
+        #[pyo3(from_py_with = whole::threads)] threads: usize,
         antialiased: bool,
         near: f32,
         far: f32,
-        sh_degree: u8,
+        #[pyo3(from_py_with = whole::sh_degree)] sh_degree: u8,
     ) -> PyResult<Bound<'py, PyAny>> {
         let options = options(background, antialiased, [near, far], sh_degree)?;
         let camera = &camera.get().inner;
@@ -67,6 +74,8 @@ impl Renderer {
 
     /// The pictures of several cameras, a list of what render gives. A graphics processor draws one while the picture
     /// before it is copied. progress is as for reconstruct, with the one stage "render".
+    ///
+    ///     >>> pictures = Renderer(car).render_many(cameras)
     #[pyo3(signature = (
         cameras, background=None, threads=0, *, antialiased=false, near=0.01, far=1e10, sh_degree=3, progress=None
     ), text_signature = "(self, cameras, background='white', threads=0, *, antialiased=False, near=0.01, far=1e10, \
@@ -76,11 +85,11 @@ impl Renderer {
         py: Python<'py>,
         cameras: Vec<Bound<'py, Camera>>,
         background: Option<&Bound<'py, PyAny>>,
-        threads: usize,
+        #[pyo3(from_py_with = whole::threads)] threads: usize,
         antialiased: bool,
         near: f32,
         far: f32,
-        sh_degree: u8,
+        #[pyo3(from_py_with = whole::sh_degree)] sh_degree: u8,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let options = options(background, antialiased, [near, far], sh_degree)?;
@@ -93,6 +102,11 @@ impl Renderer {
             })
         })?;
         Ok(cameras.iter().zip(drawn).map(|(camera, pixels)| array(py, camera, &options, pixels)).collect())
+    }
+
+    fn __reduce__(&self) -> PyResult<()> {
+        let way_out = "elsewhere a new one is made of its Gaussians: Renderer(gaussians, backend)";
+        Err(stays_here("Renderer", "working memory of this process", way_out))
     }
 
     fn __repr__(&self) -> String {

@@ -155,5 +155,5 @@ def test_what_cannot_be_aligned_is_named(face: Any, whole: vg.Scene, scan: npt.N
     with pytest.raises(vg.VgError, match=r"no\.ply") as caught:
         face.align_folder(SEDAN, "no.ply")
     assert caught.value.code == Status.IO
-    with pytest.raises(TypeError, match="^scan: "):
-        face.align_scan(*views, scan.astype(float))
+    with pytest.raises(TypeError, match="^scan: array of int32; allowed: an array of floats, metres"):
+        face.align_scan(*views, scan.astype(np.int32))

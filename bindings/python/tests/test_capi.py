@@ -199,19 +199,17 @@ def test_scenes_opened_through_ctypes_give_the_same_bytes(
 def test_what_gaussians_do_they_do_here_too(made: vg.Reconstruction, tmp_path: Path) -> None:
     ours = made.gaussians
     theirs = capi.Gaussians.from_arrays(ours.means, ours.scales, ours.quats, ours.opacities, ours.sh)
-    # Unit quaternions are normalised again, which may move their last bit.
-    again = vg.Gaussians.from_arrays(ours.means, ours.scales, ours.quats, ours.opacities, ours.sh)
-    assert same_bytes(again, theirs)
+    assert same_bytes(ours, theirs)
     matrix = looking_at_the_origin((3.0, 2.0, 1.0))
-    assert same_bytes(again.mirrored(), theirs.mirrored())
-    assert same_bytes(again.transformed(matrix), theirs.transformed(matrix))
-    assert same_bytes(again.merged(again), theirs.merged(theirs))
-    again.save_ply(tmp_path / "a.ply")
+    assert same_bytes(ours.mirrored(), theirs.mirrored())
+    assert same_bytes(ours.transformed(matrix), theirs.transformed(matrix))
+    assert same_bytes(ours.merged(ours), theirs.merged(theirs))
+    ours.save_ply(tmp_path / "a.ply")
     theirs.save_ply(tmp_path / "b.ply")
     assert (tmp_path / "a.ply").read_bytes() == (tmp_path / "b.ply").read_bytes()
     read = capi.Gaussians.load_ply(tmp_path / "a.ply")
     assert same_bytes(vg.Gaussians.load_ply(tmp_path / "a.ply"), read)
-    assert repr(read) == f"Gaussians({len(again)}, sh_degree=2)"
+    assert repr(read) == f"Gaussians({len(ours)}, sh_degree=2)"
 
 
 def test_arrays_are_read_only_and_outlive_the_gaussians(ellipsoid: Views) -> None:
@@ -392,29 +390,29 @@ def test_errors_have_the_same_codes_and_texts(ellipsoid: Views, tmp_path: Path) 
     assert caught.value.code is Status.IO
     with pytest.raises(TypeError, match=r"^images\[0\]: array of float32; allowed: a NumPy array of uint8"):
         capi.reconstruct([np.zeros((4, 4, 3), np.float32)], None, ellipsoid.cameras[:1])
-    with pytest.raises(TypeError, match=r"^depths\[0\]: array of float64"):
-        capi.reconstruct(ellipsoid.images[:1], None, ellipsoid.cameras[:1], [np.zeros((72, 96))])
-    with pytest.raises(TypeError, match="^camera: ndarray"):
+    with pytest.raises(TypeError, match=r"^depths\[0\]: array of int64; allowed: an array of floats, metres"):
+        capi.reconstruct(ellipsoid.images[:1], None, ellipsoid.cameras[:1], [np.zeros((72, 96), int)])
+    with pytest.raises(TypeError, match=r"^cameras\[0\]: array of float64"):
         capi.reconstruct(ellipsoid.images[:1], None, [np.eye(4)])
     refused: list[tuple[dict[str, Any], str]] = [
         ({"prior": "best"}, "prior: 'best'; allowed: auto, given, hull, onnx, shape"),
         ({"calibrate": "yes"}, "calibrate: 'yes'; allowed: auto, off"),
         ({"relight": "yes"}, "relight: 'yes'; allowed: auto, never"),
-        ({"photo": 2}, "options.photo: 2; allowed: 0 (no), 1 (yes)"),
+        ({"photo": 2}, "photo: 2; allowed: 0 (no), 1 (yes)"),
         ({"budget": 0}, "budget: 0; allowed: seconds above 0"),
-        ({"budget": -1}, "options.budget_s: -1"),
-        ({"resolution": 0}, "options.resolution: 0; allowed: above 0, at most 1"),
+        ({"budget": -1}, "budget: -1"),
+        ({"resolution": 0}, "resolution: 0; allowed: above 0, at most 1"),
         ({"max_views": 0}, "max_views: 0; allowed: at least 1"),
         ({"refine_iterations": 0}, "refine_iterations: 0; allowed: 1 to 1000000"),
-        ({"refine_iterations": 2_000_000}, "options.refine_iterations: 2000000; allowed: at most 1000000"),
+        ({"refine_iterations": 2_000_000}, "refine_iterations: 2000000; allowed: at most 1000000"),
         ({"refine_seconds": 0}, "refine_seconds: 0; allowed: above 0, at most 86400"),
-        ({"refine_seconds": 2, "refine_iterations": 5}, "options.refine_seconds: 2, with refine_iterations 5"),
+        ({"refine_seconds": 2, "refine_iterations": 5}, "refine_seconds: 2, with refine_iterations 5"),
         ({"cloud": np.zeros((4, 2), np.float32)}, "cloud: shape (4, 2); allowed: (n, 3)"),
-        ({"cloud": np.full((4, 3), np.nan, np.float32)}, "options.cloud[0]: [NaN, NaN, NaN]; allowed: finite"),
+        ({"cloud": np.full((4, 3), np.nan, np.float32)}, "cloud[0]: [NaN, NaN, NaN]; allowed: finite"),
         ({"masks": []}, "masks: 0 entries; allowed: 4, one per image"),
-        ({"sh_degree": 4}, "options.sh_degree: 4"),
-        ({"masks": [np.zeros((5, 5), np.uint8)] * 4}, "views[0] (000).mask: 5x5"),
-        ({"keep": 64}, "options.keep"),
+        ({"sh_degree": 4}, "sh_degree: 4"),
+        ({"masks": [np.zeros((5, 5), np.uint8)] * 4}, "masks[0]: 5x5"),
+        ({"keep": 64}, "keep"),
     ]
     for options, message in refused:
         views: dict[str, Any] = {"images": ellipsoid.images, "masks": ellipsoid.masks, "cameras": ellipsoid.cameras}

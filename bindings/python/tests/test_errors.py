@@ -33,7 +33,7 @@ def test_numbers_are_those_of_the_c_library() -> None:
 
 def test_an_error_survives_pickling() -> None:
     error = pickle.loads(pickle.dumps(vg.VgError(Status.IO, "a file")))
-    assert (type(error), error.code, str(error)) == (vg.VgError, Status.IO, "a file")
+    assert (type(error), error.code, str(error)) == (vg.FileError, Status.IO, "a file")
 
 
 WRONG_TYPES: dict[str, tuple[str, Any, str]] = {
@@ -47,17 +47,11 @@ WRONG_TYPES: dict[str, tuple[str, Any, str]] = {
     "text": ("images", lambda a: "car.png", "images[2]: str; allowed: a NumPy array of uint8"),
     "ragged": ("images", lambda a: [[1], [1, 2]], "images[2]: list; allowed: a NumPy array of uint8"),
     "float mask": ("masks", lambda a: a.astype(float), "masks[2]: array of float64; allowed: a NumPy array of bool"),
-    "double depth": (
-        "depths",
-        lambda a: a.astype(float),
-        "depths[2]: array of float64; allowed: a NumPy array of float32",
-    ),
     "millimetres": (
         "depths",
         lambda a: a.astype(np.uint16),
-        "depths[2]: array of uint16; allowed: a NumPy array of float32",
+        "depths[2]: array of uint16; allowed: an array of floats, metres, (height, width); millimetres become one by",
     ),
-    "other endian": ("depths", lambda a: a.astype(">f4"), "depths[2]: array of >f4; allowed: a NumPy array of float32"),
     "no camera": ("cameras", lambda a: np.eye(4), "cameras[2]: ndarray; allowed: a Camera"),
 }
 
@@ -147,9 +141,9 @@ def test_a_wrong_option_is_named_as_in_the_call(options: dict[str, Any], message
     assert caught.value.code is Status.ARGUMENT
 
 
-def test_a_cloud_of_doubles_is_a_type_error(ellipsoid: Views) -> None:
-    for cloud, found in ((np.zeros((4, 3)), "array of float64"), ([[0.0, 0.0, 0.0]], "list"), ("lidar.ply", "str")):
-        with pytest.raises(TypeError, match=f"^cloud: {found}; allowed: a NumPy array of float32"):
+def test_a_cloud_of_no_floats_is_a_type_error(ellipsoid: Views) -> None:
+    for cloud, found in ((np.zeros((4, 3), int), "array of int64"), ([["0", "0", "0"]], "list"), ("lidar.ply", "str")):
+        with pytest.raises(TypeError, match=f"^cloud: {found}; allowed: an array of floats, metres"):
             vg.reconstruct(ellipsoid.images, ellipsoid.masks, ellipsoid.cameras, cloud=cloud)  # type: ignore[arg-type]
 
 
@@ -240,8 +234,8 @@ def test_gaussians_say_what_is_wrong_with_them(ellipsoid: Views) -> None:
     }.items():
         with pytest.raises(vg.VgError, match="^" + re.escape(message)):
             g.transformed(matrix)
-    with pytest.raises(TypeError, match="^means: array of float64; allowed: an array of float32"):
-        vg.Gaussians.from_arrays(**{**good, "means": np.zeros((2, 3))})
+    with pytest.raises(TypeError, match="^means: array of int64; allowed: an array of floats"):
+        vg.Gaussians.from_arrays(**{**good, "means": np.zeros((2, 3), int)})
     camera = ellipsoid.cameras[0]
     drawn: list[tuple[dict[str, Any], str]] = [
         ({"background": "pink"}, 'background: "pink"; allowed: white, black, transparent'),

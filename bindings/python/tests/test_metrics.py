@@ -84,7 +84,8 @@ def test_what_cannot_be_measured_is_named(face: Any, ellipsoid: Views) -> None:
         with pytest.raises(vg.VgError, match=words) as caught:
             call()
         assert caught.value.code is Status.ARGUMENT
-    with pytest.raises(TypeError, match="points"):
-        face.surface_errors(model, scan.tolist() if face is capi else scan.astype(np.float64))
+    with pytest.raises(TypeError, match="^points: array of int64; allowed: an array of floats, metres"):
+        face.surface_errors(model, scan.astype(np.int64))
+    assert face.surface_errors(model, scan.astype(np.float64)) == face.surface_errors(model, scan)
     with pytest.raises(TypeError, match="lpips|model"):
         face.picture_errors(image, image, lpips="m.onnx")

@@ -12,7 +12,7 @@ import pytest
 import vehicle_gaussians as vg
 from conftest import looking_at_the_origin
 
-NAMES = ("means", "rotations", "scales", "opacities", "sh", "background", "pose")
+NAMES = ("means", "quats", "scales", "opacities", "sh", "background", "pose")
 
 
 def test_importing_the_package_does_not_import_torch() -> None:
@@ -46,7 +46,7 @@ def scene(torch: Any) -> dict[str, Any]:
     values = {
         "means": [[0.3, 0.2, 0.1], [-0.2, 0.4, -0.3], [0.1, -0.5, 0.2]],
         # Norms 2.6, 0.6 and 1.3.
-        "rotations": [[2.0, 1.0, -1.0, 0.9], [0.1, 0.4, 0.3, -0.3], [0.9, -0.2, 0.9, 0.1]],
+        "quats": [[2.0, 1.0, -1.0, 0.9], [0.1, 0.4, 0.3, -0.3], [0.9, -0.2, 0.9, 0.1]],
         "scales": [[2.0, 1.2, 1.5], [1.3, 2.2, 1.6], [1.8, 1.5, 2.4]],
         "opacities": [0.5, 0.7, 0.4],
         "sh": (0.3 * np.sin(np.arange(36.0))).reshape(3, 4, 3),
@@ -99,14 +99,14 @@ def test_the_gradient_of_a_quaternion_of_any_norm_is_its_own(
     torch: Any, scene: dict[str, Any], camera: vg.Camera
 ) -> None:
     weighted(torch, draw(scene, camera)).backward()
-    first = scene["rotations"].grad.clone()
+    first = scene["quats"].grad.clone()
     longer = {name: t.detach().clone().requires_grad_() for name, t in scene.items()}
     with torch.no_grad():
-        longer["rotations"] *= -8
+        longer["quats"] *= -8
     weighted(torch, draw(longer, camera)).backward()
     # Eight times as long and the other way round: the same rotation, an eighth of the gradient.
-    torch.testing.assert_close(longer["rotations"].grad, first / -8, rtol=1e-4, atol=1e-5)
-    along = (scene["rotations"].grad * scene["rotations"]).sum(1)
+    torch.testing.assert_close(longer["quats"].grad, first / -8, rtol=1e-4, atol=1e-5)
+    along = (scene["quats"].grad * scene["quats"]).sum(1)
     assert along.abs().max() < 1e-3 * first.abs().max()
 
 
@@ -123,7 +123,7 @@ def test_only_what_requires_gradients_gets_them(torch: Any, scene: dict[str, Any
 
 def test_backgrounds_by_name_and_no_pose(torch: Any, scene: dict[str, Any], camera: vg.Camera) -> None:
     gaussians = vg.Gaussians.from_arrays(
-        *(scene[name].detach().numpy() for name in ("means", "scales", "rotations", "opacities", "sh"))
+        *(scene[name].detach().numpy() for name in ("means", "scales", "quats", "opacities", "sh"))
     )
     for background in ("white", "black", "transparent"):
         picture = draw(scene, camera, background=background, pose=None)
@@ -141,7 +141,7 @@ def test_steps_of_adam_lower_a_loss(torch: Any, scene: dict[str, Any], camera: v
         scene["means"] += torch.tensor([0.3, -0.2, 0.1])
         scene["pose"] += 0.05
         scene["sh"] *= 0.5
-    adam = torch.optim.Adam([scene[name] for name in ("means", "rotations", "sh", "pose")], lr=0.02)
+    adam = torch.optim.Adam([scene[name] for name in ("means", "quats", "sh", "pose")], lr=0.02)
     losses = []
     for _ in range(30):
         adam.zero_grad()
@@ -184,7 +184,7 @@ def test_bad_tensors_are_named(torch: Any, scene: dict[str, Any], camera: vg.Cam
     with pytest.raises(vg.VgError, match=r"^opacities\[1\]"):
         draw({**scene, "opacities": scene["opacities"].detach() * torch.tensor([1.0, 5.0, 1.0])}, camera)
     with pytest.raises(vg.VgError, match=r"^quats\[2\]"):
-        draw({**scene, "rotations": scene["rotations"].detach() * torch.tensor([[1.0], [1.0], [0.0]])}, camera)
+        draw({**scene, "quats": scene["quats"].detach() * torch.tensor([[1.0], [1.0], [0.0]])}, camera)
     with pytest.raises(TypeError, match="^camera: int; allowed: a vehicle_gaussians.Camera"):
         draw(scene, 3)  # type: ignore[arg-type]
     picture = draw(scene, camera)

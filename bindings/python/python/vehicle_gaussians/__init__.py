@@ -11,9 +11,24 @@ axes are x right, y down, z forward; the centre of the top-left pixel is (0.5, 0
 Quaternions are (w, x, y, z). Pictures are RGB, row 0 at the top.
 """
 
+from . import _without_native as _without_native
 from ._align import align_box, align_folder, align_points, align_scan
 from ._alignment import Alignment
-from ._errors import Status, VgError
+from ._errors import (
+    ArgumentError,
+    ArgumentTypeError,
+    CancelledError,
+    FileError,
+    FileForbiddenError,
+    FileMissingError,
+    FormatError,
+    InternalError,
+    MissingError,
+    NotBuiltError,
+    ReconstructionError,
+    Status,
+    VgError,
+)
 from ._gradients import Gradients, Planes
 from ._measures import PictureErrors, SurfaceErrors, ViewErrors
 from ._metrics import picture_errors, surface_errors, view_errors
@@ -34,14 +49,25 @@ from ._scene import Scene, open_scene
 
 __all__ = [
     "Alignment",
+    "ArgumentError",
+    "ArgumentTypeError",
     "Camera",
+    "CancelledError",
+    "FileError",
+    "FileForbiddenError",
+    "FileMissingError",
+    "FormatError",
     "Gaussians",
     "Gradients",
+    "InternalError",
+    "MissingError",
     "Model",
+    "NotBuiltError",
     "PictureErrors",
     "Planes",
     "Points",
     "Reconstruction",
+    "ReconstructionError",
     "Renderer",
     "Scene",
     "Status",

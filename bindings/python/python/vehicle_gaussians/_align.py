@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
 import numpy.typing as npt
 
 from . import _native
 from ._alignment import Alignment
+from ._arguments import listed
+from ._types import Floats, Heading
 
 if TYPE_CHECKING:
     from ._native import Camera
@@ -19,23 +20,28 @@ if TYPE_CHECKING:
 def align_scan(
     masks: Sequence[npt.NDArray[Any] | None],
     cameras: Sequence[Camera],
-    scan: npt.NDArray[np.float32],
+    scan: Floats,
     sparse: npt.ArrayLike | None = None,
     *,
-    heading: str = "auto",
+    heading: Heading = "auto",
     names: Sequence[str] | None = None,
     threads: int = 0,
 ) -> Alignment:
     """The vehicle's frame by points scanned on the vehicle: their outline must run along the edges of all masks.
 
     masks: one for each camera, of which at least 3 are not None. cameras: with poses in the world, whose place,
-    direction and unit are anything. scan: float32 (n, 3), metres, vehicle frame. sparse: (n, 3), points of the world
+    direction and unit are anything. scan: floats (n, 3), metres, vehicle frame. sparse: (n, 3), points of the world
     that may show anything. heading: "auto", which refuses to guess where front and back fit as well; "forward": the
     first view by name, of those not taken from abeam, was taken from ahead of the vehicle's middle; "backward": from
     behind.
     names: of the views, for messages; "000", "001", ... if not given. threads: worker threads; 0 means one per core.
+
+    >>> alignment = align_scan(masks, cameras_in_world, scan)  # doctest: +SKIP
+    >>> scene = open_scene("my-car", vehicle_from_world=alignment.vehicle_from_world)  # doctest: +SKIP
     """
-    return Alignment(*_native.align_scan(masks, cameras, scan, sparse, heading, names, threads))
+    views = listed(masks, "masks", 2), listed(cameras, "cameras")
+    names = None if names is None else listed(names, "names")
+    return Alignment(*_native.align_scan(*views, scan, sparse, heading, names, threads))
 
 
 def align_box(
@@ -44,7 +50,7 @@ def align_box(
     sparse: npt.ArrayLike,
     size: npt.ArrayLike,
     *,
-    heading: str,
+    heading: Literal["forward", "backward"],
     names: Sequence[str] | None = None,
     threads: int = 0,
 ) -> Alignment:
@@ -53,8 +59,12 @@ def align_box(
     size: length, width and height, metres. sparse: points of the world, of which some show level ground around the
     vehicle. heading: "forward" or "backward"; a box does not tell. The others are as for ``align_scan``, with masks
     from all around.
+
+    >>> alignment = align_box(masks, cameras_in_world, sparse, (4.6, 1.9, 1.5), heading="forward")  # doctest: +SKIP
     """
-    return Alignment(*_native.align_box(masks, cameras, sparse, size, heading, names, threads))
+    views = listed(masks, "masks", 2), listed(cameras, "cameras")
+    names = None if names is None else listed(names, "names")
+    return Alignment(*_native.align_box(*views, sparse, size, heading, names, threads))
 
 
 def align_points(world: npt.ArrayLike, vehicle: npt.ArrayLike) -> Alignment:
@@ -62,6 +72,10 @@ def align_points(world: npt.ArrayLike, vehicle: npt.ArrayLike) -> Alignment:
 
     world, vehicle: (n, 3), the same points in both frames, the second in metres; at least 3, not on one line. Of 6 and
     more, those that contradict the others are left out.
+
+    >>> alignment = align_points(world=np.eye(3), vehicle=2 * np.eye(3))
+    >>> round(alignment.scale, 6)
+    2.0
     """
     return Alignment(*_native.align_points(world, vehicle))
 
@@ -70,11 +84,13 @@ def align_folder(
     path: str | os.PathLike[str],
     scan: str | os.PathLike[str] | None = None,
     *,
-    heading: str = "auto",
+    heading: Heading = "auto",
     threads: int = 0,
 ) -> Alignment:
     """``align_scan`` with the files of a scene: a COLMAP folder, one of 3DRealCar, or a ``transforms.json``.
 
     scan: a PLY file of points, metres, vehicle frame; the scan in a folder of 3DRealCar if not given.
+
+    >>> alignment = align_folder("3drealcar/2024_06_04_13_44_39")  # doctest: +SKIP
     """
     return Alignment(*_native.align_folder(path, scan, heading, threads))

@@ -7,25 +7,30 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ._documented import documented
+from ._equal import equal_by_value
 
+
+@equal_by_value
+@documented
 class Alignment(NamedTuple):
     """A similarity from a world of any gauge to the vehicle's frame, and how well it fits."""
 
-    #: Row-major (4, 4), metres, as ``open_scene`` and ``Camera`` take it.
     vehicle_from_world: npt.NDArray[np.float64]
-    #: Metres per unit of the world.
+    """Row-major (4, 4), metres, as ``open_scene`` and ``Camera`` take it."""
     scale: float
-    #: Typical distance of what should coincide, metres.
+    """Metres per unit of the world."""
     residual_m: float
-    #: 0 to 1; at 0 another answer fits as well.
+    """Typical distance of what should coincide, metres."""
     confidence: float
-    #: Mean distance between the outlines of scan and masks, pixels; None without a scan.
+    """0 to 1; at 0 another answer fits as well."""
     residual_px: float | None
-    #: The same with front and back exchanged.
+    """Mean distance between the outlines of scan and masks, pixels; None without a scan."""
     other_px: float | None
-    #: Views, or points, that the similarity was found from.
+    """That distance with front and back exchanged."""
     used_count: int
-    #: Which points were used, bool (n,); None where there were none to choose from.
+    """Views, or points, that the similarity was found from."""
     kept: npt.NDArray[np.bool_] | None = None
-    #: How far each point ends from its place, float64 (n,).
+    """Which points were used, bool (n,); None where there were none to choose from."""
     residuals_m: npt.NDArray[np.float64] | None = None
+    """How far each point ends from its place, float64 (n,)."""

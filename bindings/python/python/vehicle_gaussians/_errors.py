@@ -1,8 +1,9 @@
-"""What goes wrong, with the numbers of the C library."""
+"""What goes wrong, with the numbers of the C library, as classes that are Python's own too."""
 
 from __future__ import annotations
 
 import enum
+import re
 
 
 class Status(enum.IntEnum):
@@ -28,15 +29,106 @@ class Status(enum.IntEnum):
 
 
 class VgError(Exception):
-    """What the library says when it cannot: which argument or file, what was found, what is allowed."""
+    """What the library says when it cannot: which argument or file, what was found, what is allowed.
 
-    #: Which kind of failure.
+    ``VgError(code, message)`` makes the subclass of the code, which is also the Python exception that such a failure
+    usually is:
+
+    >>> isinstance(VgError(Status.ARGUMENT, "threads: -1; allowed: 0 (all cores) to 1024"), ValueError)
+    True
+    """
+
     code: Status
+    """Which kind of failure."""
+
+    def __new__(cls, code: int, message: str) -> VgError:
+        made = _class_of(code, message) if cls is VgError else cls
+        return super(VgError, made).__new__(made, message)
 
     def __init__(self, code: int, message: str) -> None:
         super().__init__(message)
         # A library newer than this file may know more.
         self.code = Status(code) if code in list(Status) else Status.INTERNAL
 
+    def __str__(self) -> str:
+        return str(self.args[0])
+
     def __reduce__(self) -> tuple[type[VgError], tuple[int, str]]:
         return type(self), (int(self.code), str(self))
+
+
+class ArgumentError(VgError, ValueError):
+    """An argument of the right kind with a value that is not accepted (ARGUMENT)."""
+
+
+class ArgumentTypeError(VgError, TypeError):
+    """An argument of the wrong kind (ARGUMENT)."""
+
+
+class FormatError(VgError, ValueError):
+    """A file's content is not what its format promises (FORMAT)."""
+
+
+class FileError(VgError, OSError):
+    """The operating system refused a file operation (IO); ``errno`` holds its number, where there is one."""
+
+    def __init__(self, code: int, message: str) -> None:
+        super().__init__(code, message)
+        self.errno = _errno(message)
+
+
+class FileMissingError(FileError, FileNotFoundError):
+    """A file or a folder is not there (IO)."""
+
+
+class FileForbiddenError(FileError, PermissionError):
+    """A file or a folder may not be read or written (IO)."""
+
+
+class ReconstructionError(VgError, RuntimeError):
+    """The input is well formed, but no vehicle can be made of it (RECONSTRUCTION)."""
+
+
+class CancelledError(VgError):
+    """The progress function asked to stop (CANCELLED)."""
+
+
+class NotBuiltError(VgError, NotImplementedError):
+    """This build leaves the function out (NOT_BUILT)."""
+
+
+class InternalError(VgError, RuntimeError):
+    """A defect of the library (INTERNAL)."""
+
+
+class MissingError(VgError, RuntimeError):
+    """Something is needed that this machine does not have (MISSING)."""
+
+
+_CLASSES: dict[int, type[VgError]] = {
+    Status.ARGUMENT: ArgumentError,
+    Status.FORMAT: FormatError,
+    Status.RECONSTRUCTION: ReconstructionError,
+    Status.CANCELLED: CancelledError,
+    Status.NOT_BUILT: NotBuiltError,
+    Status.INTERNAL: InternalError,
+    Status.MISSING: MissingError,
+}
+
+
+def _class_of(code: int, message: str) -> type[VgError]:
+    if code != Status.IO:
+        return _CLASSES.get(code, VgError if code in list(Status) else InternalError)
+    # Python knows which numbers mean what.
+    of_system = type(OSError(_errno(message), ""))
+    named: dict[type[OSError], type[FileError]] = {
+        FileNotFoundError: FileMissingError,
+        PermissionError: FileForbiddenError,
+    }
+    return named.get(of_system, FileError)
+
+
+def _errno(message: str) -> int | None:
+    """The system's number, which ends its words: "no.ply: No such file or directory (os error 2)"."""
+    found = re.search(r"\(os error (\d+)\)", message)
+    return int(found.group(1)) if found else None

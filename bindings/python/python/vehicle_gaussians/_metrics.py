@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from . import _native
 from ._measures import PictureErrors, SurfaceErrors, ViewErrors
+from ._types import Floats
 
 if TYPE_CHECKING:
     from ._native import Camera, Gaussians, Model
@@ -17,10 +18,13 @@ if TYPE_CHECKING:
 def picture_errors(
     a: npt.NDArray[Any], b: npt.NDArray[Any], *, lpips: Model | None = None, threads: int = 0
 ) -> PictureErrors:
-    """The difference of two pictures of one size, uint8 or float32 in [0, 1], (height, width, 3 or 4).
+    """The difference of two pictures of one size, uint8 or floats in [0, 1], (height, width, 3 or 4).
 
     What their alpha leaves open is white. lpips: the network that measures LPIPS, made by
     ``python -m vehicle_gaussians.export.lpips``. threads: worker threads; 0 means one per core.
+
+    >>> picture_errors(image, image).psnr_db
+    inf
     """
     return PictureErrors(*_native.picture_errors(a, b, lpips, threads))
 
@@ -30,7 +34,7 @@ def view_errors(
     image: npt.NDArray[np.uint8],
     mask: npt.NDArray[Any] | None,
     camera: Camera,
-    depth: npt.NDArray[np.float32] | None = None,
+    depth: Floats | None = None,
     *,
     lpips: Model | None = None,
     threads: int = 0,
@@ -38,15 +42,19 @@ def view_errors(
     """The error of a model, drawn on white, in one photograph, which its mask puts on white.
 
     The picture, mask, camera and depth are as for ``reconstruct``; lpips and threads as for ``picture_errors``.
+
+    >>> view_errors(car, image, mask, camera).silhouette_iou > 0.8
+    True
     """
     return ViewErrors(*_native.view_errors(gaussians, image, mask, camera, depth, lpips, threads))
 
 
-def surface_errors(
-    gaussians: Gaussians, points: npt.NDArray[np.float32], *, f_score: float = 0.05, threads: int = 0
-) -> SurfaceErrors:
-    """The error of a model's surface against points measured on the vehicle: float32 (n, 3), metres, its frame.
+def surface_errors(gaussians: Gaussians, points: Floats, *, f_score: float = 0.05, threads: int = 0) -> SurfaceErrors:
+    """The error of a model's surface against points measured on the vehicle: floats (n, 3), metres, its frame.
 
     f_score: the distance below which a point counts as met, metres. threads: as for ``picture_errors``.
+
+    >>> surface_errors(car, scan, f_score=0.02).accuracy_m < 0.02
+    True
     """
     return SurfaceErrors(*_native.surface_errors(gaussians, points, f_score, threads))

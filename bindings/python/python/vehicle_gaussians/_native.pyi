@@ -1,12 +1,13 @@
 from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Literal, final, overload
+from typing import Literal, SupportsIndex, final, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from ._gradients import Gradients, Planes
+from ._types import Backend, Background, DepthMode, Floats, Heading, Size
 
 __all__ = [
     "Camera",
@@ -14,6 +15,8 @@ __all__ = [
     "Model",
     "Renderer",
     "__version__",
+    "_camera",
+    "_gaussians",
     "_panic_on_a_worker_thread",
     "align_box",
     "align_folder",
@@ -37,9 +40,9 @@ __version__: str
 class Camera:
     @staticmethod
     def from_colmap(
-        model: str | int,
-        width: int,
-        height: int,
+        model: str | SupportsIndex,
+        width: SupportsIndex,
+        height: SupportsIndex,
         params: npt.ArrayLike,
         vehicle_from_camera: npt.ArrayLike,
     ) -> Camera: ...
@@ -47,22 +50,22 @@ class Camera:
     def from_matrix(
         K: npt.ArrayLike,
         vehicle_from_camera: npt.ArrayLike,
-        width: int,
-        height: int,
+        width: SupportsIndex,
+        height: SupportsIndex,
         distortion: npt.ArrayLike | None = None,
     ) -> Camera: ...
     @staticmethod
     def from_opencv(
         K: npt.ArrayLike,
         vehicle_from_camera: npt.ArrayLike,
-        width: int,
-        height: int,
+        width: SupportsIndex,
+        height: SupportsIndex,
         distortion: npt.ArrayLike | None = None,
         *,
         fisheye: bool = False,
     ) -> Camera: ...
-    def scaled(self, width: int, height: int) -> Camera: ...
-    def cropped(self, x: int, y: int, width: int, height: int) -> Camera: ...
+    def scaled(self, width: SupportsIndex, height: SupportsIndex) -> Camera: ...
+    def cropped(self, x: SupportsIndex, y: SupportsIndex, width: SupportsIndex, height: SupportsIndex) -> Camera: ...
     def with_pose(self, vehicle_from_camera: npt.ArrayLike) -> Camera: ...
     @property
     def width(self) -> int: ...
@@ -73,23 +76,26 @@ class Camera:
     @property
     def vehicle_from_camera(self) -> npt.NDArray[np.float64]: ...
     @property
-    def model(self) -> str: ...
+    def model(self) -> Literal["PINHOLE", "OPENCV", "FULL_OPENCV", "OPENCV_FISHEYE"]: ...
     @property
     def params(self) -> npt.NDArray[np.float64]: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Camera: ...
+    def __deepcopy__(self, memo: object, /) -> Camera: ...
 
 @final
 class Renderer:
-    def __new__(cls, gaussians: Gaussians, backend: Literal["auto", "cpu", "gpu"] = "auto") -> Renderer: ...
+    def __new__(cls, gaussians: Gaussians, backend: Backend = "auto") -> Renderer: ...
     @property
-    def backend(self) -> str: ...
+    def backend(self) -> Literal["cpu", "gpu"]: ...
     @property
     def choice(self) -> str: ...
     def render(
         self,
         camera: Camera,
-        background: str | npt.ArrayLike = "white",
+        background: Background = "white",
         threads: int = 0,
         *,
         antialiased: bool = False,
@@ -100,7 +106,7 @@ class Renderer:
     def render_many(
         self,
         cameras: Sequence[Camera],
-        background: str | npt.ArrayLike = "white",
+        background: Background = "white",
         threads: int = 0,
         *,
         antialiased: bool = False,
@@ -112,13 +118,7 @@ class Renderer:
 @final
 class Gaussians:
     @staticmethod
-    def from_arrays(
-        means: npt.NDArray[np.float32],
-        scales: npt.NDArray[np.float32],
-        quats: npt.NDArray[np.float32],
-        opacities: npt.NDArray[np.float32],
-        sh: npt.NDArray[np.float32],
-    ) -> Gaussians: ...
+    def from_arrays(means: Floats, scales: Floats, quats: Floats, opacities: Floats, sh: Floats) -> Gaussians: ...
     @staticmethod
     def load_ply(path: str | PathLike[str]) -> Gaussians: ...
     def save_ply(self, path: str | PathLike[str]) -> None: ...
@@ -129,11 +129,11 @@ class Gaussians:
     def render(
         self,
         camera: Camera,
-        background: str | npt.ArrayLike = "white",
+        background: Background = "white",
         depth: Literal[False] = False,
         threads: int = 0,
         *,
-        dtype: Literal["uint8"] | type[np.uint8] = "uint8",
+        dtype: Literal["uint8"] | type[np.uint8] | np.dtype[np.uint8] = "uint8",
         antialiased: bool = False,
         near: float = 0.01,
         far: float = 1e10,
@@ -143,25 +143,11 @@ class Gaussians:
     def render(
         self,
         camera: Camera,
-        background: str | npt.ArrayLike = "white",
-        depth: Literal[False] = False,
-        threads: int = 0,
-        *,
-        dtype: Literal["float32"] | type[np.float32],
-        antialiased: bool = False,
-        near: float = 0.01,
-        far: float = 1e10,
-        sh_degree: int = 3,
-    ) -> npt.NDArray[np.float32]: ...
-    @overload
-    def render(
-        self,
-        camera: Camera,
-        background: str | npt.ArrayLike = "white",
-        *,
+        background: Background,
         depth: Literal[True],
         threads: int = 0,
-        dtype: Literal["uint8"] | type[np.uint8] = "uint8",
+        *,
+        dtype: Literal["uint8"] | type[np.uint8] | np.dtype[np.uint8] = "uint8",
         antialiased: bool = False,
         near: float = 0.01,
         far: float = 1e10,
@@ -171,44 +157,114 @@ class Gaussians:
     def render(
         self,
         camera: Camera,
-        background: str | npt.ArrayLike = "white",
+        background: Background = "white",
         *,
         depth: Literal[True],
         threads: int = 0,
-        dtype: Literal["float32"] | type[np.float32],
+        dtype: Literal["uint8"] | type[np.uint8] | np.dtype[np.uint8] = "uint8",
+        antialiased: bool = False,
+        near: float = 0.01,
+        far: float = 1e10,
+        sh_degree: int = 3,
+    ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]: ...
+    @overload
+    def render(
+        self,
+        camera: Camera,
+        background: Background = "white",
+        depth: bool = False,
+        threads: int = 0,
+        *,
+        dtype: Literal["uint8"] | type[np.uint8] | np.dtype[np.uint8] = "uint8",
+        antialiased: bool = False,
+        near: float = 0.01,
+        far: float = 1e10,
+        sh_degree: int = 3,
+    ) -> npt.NDArray[np.uint8] | tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]: ...
+    @overload
+    def render(
+        self,
+        camera: Camera,
+        background: Background = "white",
+        depth: Literal[False] = False,
+        threads: int = 0,
+        *,
+        dtype: Literal["float32"] | type[np.float32] | np.dtype[np.float32],
+        antialiased: bool = False,
+        near: float = 0.01,
+        far: float = 1e10,
+        sh_degree: int = 3,
+    ) -> npt.NDArray[np.float32]: ...
+    @overload
+    def render(
+        self,
+        camera: Camera,
+        background: Background,
+        depth: Literal[True],
+        threads: int = 0,
+        *,
+        dtype: Literal["float32"] | type[np.float32] | np.dtype[np.float32],
         antialiased: bool = False,
         near: float = 0.01,
         far: float = 1e10,
         sh_degree: int = 3,
     ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]: ...
+    @overload
+    def render(
+        self,
+        camera: Camera,
+        background: Background = "white",
+        *,
+        depth: Literal[True],
+        threads: int = 0,
+        dtype: Literal["float32"] | type[np.float32] | np.dtype[np.float32],
+        antialiased: bool = False,
+        near: float = 0.01,
+        far: float = 1e10,
+        sh_degree: int = 3,
+    ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]: ...
+    @overload
+    def render(
+        self,
+        camera: Camera,
+        background: Background = "white",
+        depth: bool = False,
+        threads: int = 0,
+        *,
+        dtype: Literal["float32"] | type[np.float32] | np.dtype[np.float32],
+        antialiased: bool = False,
+        near: float = 0.01,
+        far: float = 1e10,
+        sh_degree: int = 3,
+    ) -> npt.NDArray[np.float32] | tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]: ...
     def render_planes(
         self,
         camera: Camera,
-        background: str | npt.ArrayLike = "white",
+        background: Background = "white",
         threads: int = 0,
         *,
         antialiased: bool = False,
         near: float = 0.01,
         far: float = 1e10,
         sh_degree: int = 3,
-        depth_mode: str = "expected",
-        backend: Literal["auto", "cpu", "gpu"] = "auto",
+        depth_mode: DepthMode = "expected",
+        backend: Backend = "auto",
     ) -> Planes: ...
     def render_backward(
         self,
         camera: Camera,
-        color: npt.NDArray[np.float32] | None = None,
-        alpha: npt.NDArray[np.float32] | None = None,
-        depth: npt.NDArray[np.float32] | None = None,
-        background: str | npt.ArrayLike = "white",
+        color: Floats | None = None,
+        alpha: Floats | None = None,
+        depth: Floats | None = None,
+        background: Background = "white",
         threads: int = 0,
         *,
         antialiased: bool = False,
         near: float = 0.01,
         far: float = 1e10,
         sh_degree: int = 3,
-        depth_mode: str = "expected",
-        backend: Literal["auto", "cpu", "gpu"] = "auto",
+        depth_mode: DepthMode = "expected",
+        backend: Backend = "auto",
     ) -> Gradients: ...
     @property
     def means(self) -> npt.NDArray[np.float32]: ...
@@ -225,6 +281,11 @@ class Gaussians:
     @property
     def bounds(self) -> npt.NDArray[np.float32] | None: ...
     def __len__(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __copy__(self) -> Gaussians: ...
+    def __deepcopy__(self, memo: object, /) -> Gaussians: ...
 
 @final
 class Model:
@@ -255,9 +316,9 @@ def similarity_from_points(source: npt.ArrayLike, target: npt.ArrayLike) -> npt.
 def align_scan(
     masks: Sequence[npt.NDArray[np.generic] | None],
     cameras: Sequence[Camera],
-    scan: npt.NDArray[np.float32],
+    scan: Floats,
     sparse: npt.ArrayLike | None,
-    heading: str,
+    heading: Heading,
     names: Sequence[str] | None,
     threads: int,
 ) -> tuple[npt.NDArray[np.float64], float, float, float, float | None, float | None, int]: ...
@@ -266,7 +327,7 @@ def align_box(
     cameras: Sequence[Camera],
     sparse: npt.ArrayLike,
     size: npt.ArrayLike,
-    heading: str,
+    heading: Heading,
     names: Sequence[str] | None,
     threads: int,
 ) -> tuple[npt.NDArray[np.float64], float, float, float, float | None, float | None, int]: ...
@@ -284,7 +345,7 @@ def align_points(
     npt.NDArray[np.float64],
 ]: ...
 def align_folder(
-    path: str | PathLike[str], scan: str | PathLike[str] | None, heading: str, threads: int
+    path: str | PathLike[str], scan: str | PathLike[str] | None, heading: Heading, threads: int
 ) -> tuple[npt.NDArray[np.float64], float, float, float, float | None, float | None, int]: ...
 def picture_errors(
     a: npt.NDArray[np.generic],
@@ -297,13 +358,13 @@ def view_errors(
     image: npt.NDArray[np.uint8],
     mask: npt.NDArray[np.generic] | None,
     camera: Camera,
-    depth: npt.NDArray[np.float32] | None,
+    depth: Floats | None,
     lpips: Model | None,
     threads: int,
 ) -> tuple[float, float | None, float | None, float | None, float, float | None, float | None]: ...
 def surface_errors(
     gaussians: Gaussians,
-    points: npt.NDArray[np.float32],
+    points: Floats,
     f_score: float,
     threads: int,
 ) -> list[float]: ...
@@ -327,7 +388,7 @@ def reconstruct(
     relight: str,
     photo: bool,
     cloud: object | None,
-    vehicle_size: Sequence[float] | None,
+    vehicle_size: Size | None,
     sh_degree: int,
     keep: Sequence[str],
     check: bool,
@@ -356,4 +417,8 @@ def open_scene(
     list[Camera],
     list[str],
 ]: ...
+def _camera(
+    model: str, width: int, height: int, params: Sequence[float], vehicle_from_camera: Sequence[float]
+) -> Camera: ...
+def _gaussians(means: Floats, scales: Floats, quats: Floats, opacities: Floats, sh: Floats) -> Gaussians: ...
 def _panic_on_a_worker_thread() -> None: ...

@@ -5,56 +5,60 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _native
+from ._arguments import listed
+from ._documented import documented
+from ._equal import equal_by_value
 from ._native import Camera, Gaussians, Model
-
-#: Masks are bool, or uint8 where 128 and above is vehicle.
-Mask: TypeAlias = npt.NDArray[np.bool_] | npt.NDArray[np.uint8]
+from ._types import Backend, Calibrate, Floats, Keep, Mask, Prior, Relight, Size, Symmetry
 
 
+@equal_by_value
+@documented
 class Points(NamedTuple):
     """The metric coloured point cloud: a point for every vehicle pixel with depth."""
 
-    #: Metres, vehicle frame; float32 (n, 3).
     positions: npt.NDArray[np.float32]
-    #: sRGB; uint8 (n, 3).
+    """Metres, vehicle frame; float32 (n, 3)."""
     colors: npt.NDArray[np.uint8]
+    """sRGB; uint8 (n, 3)."""
 
 
-@dataclass(frozen=True)
+@equal_by_value
+@dataclass(frozen=True, eq=False)
 class Reconstruction:
     """A finished reconstruction."""
 
-    #: The vehicle.
     gaussians: Gaussians
-    #: What was done, how long it took, what was left out and why.
+    """The vehicle."""
     report: dict[str, Any]
-    #: The point cloud, if asked for.
+    """What was done, how long it took, what was left out and why."""
     points: Points | None
+    """The point cloud, if asked for."""
 
 
 def reconstruct(
     images: Iterable[npt.NDArray[np.uint8]],
     masks: Iterable[Mask | None] | None,
     cameras: Iterable[Camera],
-    depths: Iterable[npt.NDArray[np.float32] | None] | None = None,
+    depths: Iterable[Floats | None] | None = None,
     *,
-    prior: Literal["auto", "given", "hull", "shape", "onnx"] = "auto",
+    prior: Prior = "auto",
     prior_model: Model | None = None,
     head_model: Model | None = None,
-    calibrate: Literal["auto", "off"] = "auto",
-    symmetry: Literal["auto", "always", "never", "flip"] = "auto",
-    relight: Literal["auto", "never"] = "auto",
+    calibrate: Calibrate = "auto",
+    symmetry: Symmetry = "auto",
+    relight: Relight = "auto",
     photo: bool = True,
-    cloud: npt.NDArray[np.float32] | None = None,
-    vehicle_size: tuple[float, float, float] | None = None,
+    cloud: Floats | None = None,
+    vehicle_size: Size | None = None,
     sh_degree: int = 2,
-    keep: str | Iterable[str] = (),
+    keep: Keep | Iterable[Keep] = (),
     check: bool = True,
     points: bool = False,
     budget: float | None = None,
@@ -63,7 +67,7 @@ def reconstruct(
     refine_iterations: int | None = None,
     refine_seconds: float | None = None,
     refine_hold_out: bool = False,
-    refine_backend: Literal["auto", "cpu", "gpu"] = "auto",
+    refine_backend: Backend = "auto",
     threads: int = 0,
     names: Iterable[str] | None = None,
     progress: Callable[[str, float], object] | None = None,
@@ -74,7 +78,7 @@ def reconstruct(
     masks: (height, width), bool or uint8 where 128 and above is vehicle; None where nobody said.
     cameras: one per image, posed in the vehicle's frame (x forward, y left, z up, metres; y = 0 is the plane of
     symmetry).
-    depths: float32 (height, width), metres along the optical axis, 0 for none.
+    depths: floats (height, width), metres along the optical axis, 0 for none.
     prior: "given" takes the depths, "hull" the silhouettes, "shape" the silhouettes and what vehicles look like,
     "onnx" the network prior_model; "auto" the depths if every used view has them, else "shape".
     prior_model, head_model: networks that tell depth, and that make Gaussians of pixels.
@@ -84,7 +88,7 @@ def reconstruct(
     photographs instead of the model ("flip").
     relight: show mirror images in the light of their own side ("auto"), or as they were seen ("never").
     photo: whether prior "shape" moves its surface to where the photographs agree.
-    cloud: points measured on the vehicle, float32 (n, 3), metres, vehicle frame, all finite; some may be wrong or show
+    cloud: points measured on the vehicle, floats (n, 3), metres, vehicle frame, all finite; some may be wrong or show
     something else. Priors "shape" and "hull" bend their surface to them.
     vehicle_size: length, width, height in metres, where known.
     sh_degree: highest degree of the colour, 0 to 3.
@@ -104,12 +108,18 @@ def reconstruct(
     names: of the views, for messages and the report.
     progress: called as progress(stage, fraction) on this thread; a true return value cancels (a VgError with code
     CANCELLED), an exception passes through. Ctrl-C raises KeyboardInterrupt at the next call.
+
+    >>> scene = open_scene("my-car")
+    >>> made = reconstruct(scene.images, scene.masks, scene.cameras, scene.depths, names=scene.names)
+    >>> made.gaussians.save_ply("car.ply")
+    >>> made.report["prior"]
+    'given'
     """
     gaussians, report, lifted = _native.reconstruct(
-        list(images),
-        None if masks is None else list(masks),
-        list(cameras),
-        None if depths is None else list(depths),
+        listed(images, "images", 3),
+        None if masks is None else listed(masks, "masks", 2),
+        listed(cameras, "cameras"),
+        None if depths is None else listed(depths, "depths", 2),
         prior=prior,
         prior_model=prior_model,
         head_model=head_model,
@@ -118,9 +128,9 @@ def reconstruct(
         relight=relight,
         photo=photo,
         cloud=cloud,
-        vehicle_size=None if vehicle_size is None else list(vehicle_size),
+        vehicle_size=vehicle_size,
         sh_degree=sh_degree,
-        keep=[keep] if isinstance(keep, str) else list(keep),
+        keep=[keep] if isinstance(keep, str) else listed(keep, "keep"),
         check=check,
         points=points,
         budget=budget,
@@ -131,7 +141,7 @@ def reconstruct(
         refine_hold_out=refine_hold_out,
         refine_backend=refine_backend,
         threads=threads,
-        names=None if names is None else list(names),
+        names=None if names is None else listed(names, "names"),
         progress=progress,
     )
     return Reconstruction(gaussians, json.loads(report), None if lifted is None else Points(*lifted))

@@ -10,23 +10,26 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
+from ._arguments import listed
+from ._equal import equal_by_value
 from ._native import Camera
 
 
-@dataclass(frozen=True)
+@equal_by_value
+@dataclass(frozen=True, eq=False)
 class Scene:
     """Views of one vehicle, a list entry each, as ``reconstruct`` takes them."""
 
-    #: RGB, uint8 (height, width, 3).
     images: list[npt.NDArray[np.uint8]]
-    #: True is vehicle, (height, width); None where there is no mask.
+    """RGB, uint8 (height, width, 3)."""
     masks: list[npt.NDArray[np.bool_] | None]
-    #: Metres along the optical axis, 0 for none, float32 (height, width); None where there is no depth map.
+    """True is vehicle, (height, width); None where there is no mask."""
     depths: list[npt.NDArray[np.float32] | None]
-    #: Posed in the vehicle's frame.
+    """Metres along the optical axis, 0 for none, float32 (height, width); None where there is no depth map."""
     cameras: list[Camera]
-    #: The pictures' paths below their images folder.
+    """Posed in the vehicle's frame."""
     names: list[str]
+    """The pictures' paths below their images folder."""
 
 
 def open_scene(
@@ -45,7 +48,11 @@ def open_scene(
     depth_scale: metres per number in the depth files, instead of what the scene says.
 
     What is legal but looks like a mistake is a warning.
+
+    >>> scene = open_scene("my-car", ["000", "002"])
+    >>> scene.names
+    ['000.png', '002.png']
     """
     if views is not None:
-        views = [views] if isinstance(views, str) else list(views)
+        views = [views] if isinstance(views, str) else listed(views, "views")
     return Scene(*_native.open_scene(path, views, vehicle_from_world, depth_scale, load_depth))

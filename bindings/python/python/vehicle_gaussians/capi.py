@@ -20,6 +20,7 @@ import ctypes as ct
 import enum
 import json
 import os
+import re
 import signal
 import sys
 import threading
@@ -28,13 +29,16 @@ import weakref
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import FrameType
-from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
+from typing import Any, Literal, NamedTuple, NoReturn, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from ._alignment import Alignment
-from ._errors import Status, VgError
+from ._arguments import bad_type, bad_value, doubles, floats, listed, pose, real, whole
+from ._equal import equal_by_value
+from ._errors import ArgumentTypeError, Status, VgError
+from ._frozen import FrozenArray
 from ._gradients import Gradients, Planes
 from ._measures import PictureErrors, SurfaceErrors, ViewErrors
 
@@ -161,6 +165,9 @@ class vg_camera(ct.Structure):
         ("vehicle_from_camera", ct.c_double * 12),
         ("reserved", ct.c_uint64 * 4),
     )
+
+    def __eq__(self, other: object) -> bool:
+        return bytes(self) == bytes(other) if isinstance(other, vg_camera) else NotImplemented
 
 
 class vg_image(ct.Structure):
@@ -633,7 +640,28 @@ def _call(name: str, *arguments: Any) -> None:
     if status != Status.OK:
         message = _utf8(library.vg_error_message(error))
         library.vg_error_free(error)
-        raise VgError(status, message)
+        raise VgError(status, _in_python(message) if status in (Status.ARGUMENT, Status.NOT_BUILT) else message)
+
+
+#: What the header calls arguments, and what this module does.
+_NAMES = (
+    (r"^(options|arrays|gradient|view)\.", ""),
+    (r"^views(\[\d+\])(?: \(.*?\))?\.(camera|image|mask|depth|name)\b", r"\2s\1"),
+    (r"^(positions|means)\b", "means"),
+    (r"^rotations\b", "quats"),
+    (r"^(budget)_s\b|^(f_score)_m\b|^(near|far)_plane\b|^(background)_color\b", r"\1\2\3\4"),
+    (r"^(scan|cloud)_count\b", r"\1"),
+    (r"^(param|point)_count\b", r"\1s"),
+    (r"^view_count\b", "cameras"),
+)
+
+
+def _in_python(message: str) -> str:
+    """The message with the argument's name in Python: "options.budget_s: -1; ..." is about budget."""
+    argument, colon, rest = message.partition(": ")
+    for theirs, ours in _NAMES:
+        argument = re.sub(theirs, ours, argument)
+    return argument + colon + rest
 
 
 def _initial(structure: type[ct.Structure]) -> Any:
@@ -648,6 +676,15 @@ def _initial(structure: type[ct.Structure]) -> Any:
 class _Handle:
     """An object of the library, freed when nobody refers to it any more."""
 
+    #: What it holds, and what to do where it is needed elsewhere.
+    _holds, _way_out = "memory of this process", "elsewhere a new one is made"
+
+    def __reduce_ex__(self, protocol: object) -> NoReturn:
+        raise TypeError(
+            f"{type(self).__name__}: cannot be pickled or copied, because it holds {self._holds}; "
+            f"threads may share it, and {self._way_out}"
+        )
+
     def __init__(self, name: str, pointer: ct.c_void_p) -> None:
         self._as_parameter_ = pointer.value
         free = getattr(library, f"vg_{name}_free")
@@ -660,15 +697,17 @@ class _Handle:
             return np.zeros(shape, dtype)
         memory: Any = (ct.c_uint8 * (int(np.prod(shape)) * np.dtype(dtype).itemsize)).from_address(address)
         memory.owner = self
-        return np.frombuffer(memoryview(memory).toreadonly(), dtype).reshape(shape)
+        return np.frombuffer(memoryview(memory).toreadonly(), dtype).reshape(shape).view(FrozenArray)
 
 
 class Context(_Handle):
     """Worker threads and memory for calls that follow each other; 0 threads means one per core."""
 
+    _holds, _way_out = "threads of this process", "another process makes its own: Context(threads)"
+
     def __init__(self, threads: int = 0) -> None:
         options = _initial(vg_context_options)
-        options.threads = threads
+        options.threads = _threads(threads)
         made = ct.c_void_p()
         _call("vg_context_new", ct.byref(options), ct.byref(made))
         super().__init__("context", made)
@@ -681,6 +720,8 @@ class Context(_Handle):
 class Model(_Handle):
     """A network in an ONNX file, for prior_model and head_model of reconstruct; the arguments are those of
     vehicle_gaussians.Model. Any number of threads may use one at a time."""
+
+    _holds, _way_out = "a network that is open in this process", "another process opens its file again: Model(path)"
 
     def __init__(
         self,
@@ -695,7 +736,7 @@ class Model(_Handle):
         options = _initial(vg_model_options)
         options.runtime = None if runtime is None else os.fsencode(runtime)
         options.provider = _choice(Provider, "provider", provider)
-        options.fall_back, options.threads, options.arena = fall_back, threads, arena
+        options.fall_back, options.threads, options.arena = fall_back, _threads(threads), arena
         options.prepack = {None: Prepack.AUTO, True: Prepack.ALWAYS, False: Prepack.NEVER}[prepack]
         made = ct.c_void_p()
         _call("vg_model_open", os.fsencode(path), ct.byref(options), ct.byref(made))
@@ -705,6 +746,15 @@ class Model(_Handle):
 
     def __repr__(self) -> str:
         return f"Model({str(self.path)!r})"
+
+
+def _threads(number: int) -> int:
+    # The library knows the highest.
+    return whole(number, "threads", 0, _U32, "0 (all cores) to 1024")
+
+
+#: The largest number that an argument of 32 bits without sign holds.
+_U32 = (1 << 32) - 1
 
 
 class AnyCamera(Protocol):
@@ -729,11 +779,16 @@ def camera_from_colmap(
     model: str | int, width: int, height: int, params: npt.ArrayLike, vehicle_from_camera: npt.ArrayLike
 ) -> vg_camera:
     """A camera of one of COLMAP's models; the pose is 3x4 or 4x4."""
-    number = CameraModel.__members__.get(model, -1) if isinstance(model, str) else model
-    values, pose, made = _doubles(params), _pose(vehicle_from_camera), vg_camera()
+    if not isinstance(model, (str, int)):
+        raise bad_type("model", model, "COLMAP's name or number")
+    number = CameraModel.__members__.get(model) if isinstance(model, str) else model
+    if number not in list(CameraModel):
+        raise bad_value("model", model, ", ".join(f"{m.name} ({m})" for m in CameraModel))
+    values, rows, made = doubles(params, "params"), pose(vehicle_from_camera, "vehicle_from_camera"), vg_camera()
+    size = _side(width, "width"), _side(height, "height")
     _call(
         "vg_camera_from_colmap_model",
-        *(number, values.ctypes.data, values.size, width, height, pose.ctypes.data, ct.byref(made)),
+        *(number, values.ctypes.data, values.size, *size, rows.ctypes.data, ct.byref(made)),
     )
     return made
 
@@ -748,71 +803,78 @@ def camera_from_opencv(
     fisheye: bool = False,
 ) -> vg_camera:
     """A camera of OpenCV's calibration, which puts the centre of the top-left pixel at (0, 0)."""
-    k, bent, pose, made = _doubles(K, (3, 3)), _doubles(distortion), _pose(vehicle_from_camera), vg_camera()
+    k, bent = doubles(K, "K", (3, 3)), doubles(distortion, "distortion")
+    rows, made = pose(vehicle_from_camera, "vehicle_from_camera"), vg_camera()
+    size = _side(width, "width"), _side(height, "height")
     _call(
         "vg_camera_from_opencv",
-        *(k.ctypes.data, bent.ctypes.data, bent.size, fisheye, width, height, pose.ctypes.data, ct.byref(made)),
+        *(k.ctypes.data, bent.ctypes.data, bent.size, fisheye, *size, rows.ctypes.data, ct.byref(made)),
     )
     return made
+
+
+def _side(number: int, argument: str) -> int:
+    # The library knows the highest.
+    return whole(number, argument, 1, _U32, "1 to 8192")
 
 
 def pose_from_colmap(
     qvec: npt.ArrayLike, tvec: npt.ArrayLike, vehicle_from_world: npt.ArrayLike | None = None
 ) -> npt.NDArray[np.float64]:
     """vehicle_from_camera (4x4) of COLMAP's world-to-camera quaternion (w, x, y, z) and translation."""
-    q, t, world = _doubles(qvec, (4,)), _doubles(tvec, (3,)), _optional_doubles(vehicle_from_world, (4, 4))
-    pose = np.eye(4)
-    _call("vg_pose_from_colmap", q.ctypes.data, t.ctypes.data, _address(world), pose.ctypes.data)
-    return pose
+    q, t, world = doubles(qvec, "qvec", (4,)), doubles(tvec, "tvec", (3,)), _similarity(vehicle_from_world)
+    made = np.eye(4)
+    _call("vg_pose_from_colmap", q.ctypes.data, t.ctypes.data, _address(world), made.ctypes.data)
+    return made
 
 
 def pose_from_opengl(
     camera_to_world: npt.ArrayLike, vehicle_from_world: npt.ArrayLike | None = None
 ) -> npt.NDArray[np.float64]:
     """vehicle_from_camera (4x4) of a camera-to-world matrix with OpenGL's camera axes, as nerfstudio writes it."""
-    matrix, world = _pose(camera_to_world), _optional_doubles(vehicle_from_world, (4, 4))
-    pose = np.eye(4)
-    _call("vg_pose_from_opengl", matrix.ctypes.data, _address(world), pose.ctypes.data)
-    return pose
+    matrix, world = pose(camera_to_world, "camera_to_world"), _similarity(vehicle_from_world)
+    made = np.eye(4)
+    _call("vg_pose_from_opengl", matrix.ctypes.data, _address(world), made.ctypes.data)
+    return made
 
 
 def pose_from_box(ego_from_vehicle: npt.ArrayLike, ego_from_camera: npt.ArrayLike) -> npt.NDArray[np.float64]:
     """vehicle_from_camera (4x4) of a tracked box and the camera in one frame."""
-    vehicle, camera, pose = _pose(ego_from_vehicle), _pose(ego_from_camera), np.eye(4)
-    _call("vg_pose_from_box", vehicle.ctypes.data, camera.ctypes.data, pose.ctypes.data)
-    return pose
+    vehicle, camera = pose(ego_from_vehicle, "ego_from_vehicle"), pose(ego_from_camera, "ego_from_camera")
+    made = np.eye(4)
+    _call("vg_pose_from_box", vehicle.ctypes.data, camera.ctypes.data, made.ctypes.data)
+    return made
 
 
-def _doubles(values: npt.ArrayLike, shape: tuple[int, ...] | None = None) -> npt.NDArray[np.float64]:
-    array = np.ascontiguousarray(values, dtype=np.float64)
-    if shape is not None and array.shape != shape:
-        raise VgError(Status.ARGUMENT, f"an array of shape {array.shape}; allowed: {shape}")
-    return array
-
-
-def _optional_doubles(values: npt.ArrayLike | None, shape: tuple[int, ...]) -> npt.NDArray[np.float64] | None:
-    return None if values is None else _doubles(values, shape)
+def _similarity(vehicle_from_world: npt.ArrayLike | None) -> npt.NDArray[np.float64] | None:
+    return None if vehicle_from_world is None else doubles(vehicle_from_world, "vehicle_from_world", (4, 4))
 
 
 def _address(array: npt.NDArray[Any] | None) -> int | None:
     return None if array is None else array.ctypes.data
 
 
-def _pose(matrix: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    array = _doubles(matrix)
-    if array.shape not in ((3, 4), (4, 4)) or (array.shape == (4, 4) and array[3].tolist() != [0, 0, 0, 1]):
-        raise VgError(Status.ARGUMENT, f"a pose of shape {array.shape}; allowed: 3x4, or 4x4 with last row 0 0 0 1")
-    return array
-
-
-def _camera(camera: Camera) -> vg_camera:
+def _camera(camera: Camera, argument: str = "camera") -> vg_camera:
     if isinstance(camera, vg_camera):
         return camera
     try:
         members = (camera.model, camera.width, camera.height, camera.params, camera.vehicle_from_camera)
     except AttributeError:
-        raise TypeError(f"camera: {type(camera).__name__}; allowed: a vg_camera, or a Camera") from None
+        raise bad_type(argument, camera, "a vg_camera, or a Camera") from None
     return camera_from_colmap(*members)
+
+
+def _lent_context(context: Context | None) -> int | None:
+    if context is not None and not isinstance(context, Context):
+        raise bad_type("context", context, "a Context")
+    return None if context is None else context._as_parameter_
+
+
+def _lent_gaussians(gaussians: Gaussians, argument: str = "gaussians") -> _Handle:
+    if not isinstance(gaussians, Gaussians):
+        way_out = "capi.Gaussians; arrays of others become one by capi.Gaussians.from_arrays"
+        raise bad_type(argument, gaussians, way_out)
+    return gaussians._handle
 
 
 class Gaussians:
@@ -841,25 +903,22 @@ class Gaussians:
         opacities: npt.NDArray[np.float32],
         sh: npt.NDArray[np.float32],
     ) -> Gaussians:
-        """Copies float32 arrays of shapes (n, 3), (n, 3), (n, 4), (n,) and (n, (degree + 1)^2, 3)."""
-        n, coefficients = len(means), sh.shape[1] if sh.ndim == 3 else -1
-        degree = {1: 0, 4: 1, 9: 2, 16: 3}.get(coefficients, -1)
+        """Copies arrays of shapes (n, 3), (n, 3), (n, 4), (n,) and (n, (degree + 1)^2, 3)."""
+        given = {"means": means, "scales": scales, "quats": quats, "opacities": opacities, "sh": sh}
+        taken = {name: np.ascontiguousarray(floats(array, name, "an array of floats")) for name, array in given.items()}
+        n, bands = len(taken["means"]), taken["sh"].shape[1:2]
+        degree = {(1,): 0, (4,): 1, (9,): 2, (16,): 3}.get(bands, -1)
+        shapes = {"means": (n, 3), "scales": (n, 3), "quats": (n, 4), "opacities": (n,), "sh": (n, *bands, 3)}
+        if degree < 0:
+            raise bad_value("sh", f"shape {taken['sh'].shape}", "(n, K, 3) with K = 1, 4, 9 or 16")
+        for name, shape in shapes.items():
+            if taken[name].shape != shape:
+                raise bad_value(name, f"shape {taken[name].shape}", f"{shape}")
         arrays = _initial(vg_gaussian_arrays)
-        alive = []
-        shapes = {
-            "positions": (n, 3),
-            "scales": (n, 3),
-            "rotations": (n, 4),
-            "opacities": (n,),
-            "sh": (n, coefficients, 3),
-        }
-        for (field, shape), array in zip(shapes.items(), (means, scales, quats, opacities, sh), strict=True):
-            _expect(array, field, np.float32)
-            if array.shape != shape:
-                raise VgError(Status.ARGUMENT, f"{field}: shape {array.shape}; allowed: {shape}")
-            alive.append(np.ascontiguousarray(array))
-            setattr(arrays, field, alive[-1].ctypes.data)
         arrays.count, arrays.sh_degree = n, degree
+        fields = ("positions", "scales", "rotations", "opacities", "sh")
+        for field, array in zip(fields, taken.values(), strict=True):
+            setattr(arrays, field, array.ctypes.data)
         return cls._made_by("vg_gaussians_from_arrays", ct.byref(arrays))
 
     def save_ply(self, path: str | os.PathLike[str]) -> None:
@@ -872,12 +931,12 @@ class Gaussians:
 
     def transformed(self, to_from_vehicle: npt.ArrayLike) -> Gaussians:
         """These in another frame, moved by a 4x4 similarity."""
-        matrix = _doubles(to_from_vehicle, (4, 4))
+        matrix = doubles(to_from_vehicle, "to_from_vehicle", (4, 4))
         return self._made_by("vg_gaussians_transform", self._handle, matrix.ctypes.data)
 
     def merged(self, other: Gaussians) -> Gaussians:
         """These, then those of other."""
-        return self._made_by("vg_gaussians_merge", self._handle, other._handle)
+        return self._made_by("vg_gaussians_merge", self._handle, _lent_gaussians(other, "other"))
 
     def render(
         self,
@@ -922,7 +981,7 @@ class Gaussians:
         elif dtype == np.float32:
             target.color_format, channels = Format.RGBA32F, 4
         else:
-            raise TypeError(f"dtype: {dtype}; allowed: uint8 or float32")
+            raise ArgumentTypeError(Status.ARGUMENT, f"dtype: {dtype}; allowed: uint8 or float32")
         size = (posed.height, posed.width)
         picture = np.empty((*size, channels), dtype)
         depth = np.empty(size, np.float32) if with_depth else None
@@ -977,9 +1036,9 @@ class Gaussians:
         for name, array, channels in (("color", color, (3,)), ("alpha", alpha, ()), ("depth", depth, ())):
             if array is None:
                 continue
-            _expect(array, name, np.float32)
+            array = floats(array, name, "an array of floats")
             if array.shape != (*size[::-1], *channels):
-                raise VgError(Status.ARGUMENT, f"{name}: shape {array.shape}; allowed: {(*size[::-1], *channels)}")
+                raise bad_value(name, f"shape {array.shape}", f"{(*size[::-1], *channels)}")
             lent = _lent(array, Format.DEPTH32F, alive)
             setattr(gradient, name, lent.data)
             setattr(gradient, name + "_row_stride", lent.row_stride)
@@ -1040,6 +1099,25 @@ class Gaussians:
     def __len__(self) -> int:
         return int(library.vg_gaussians_count(self._handle))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Arrays for pickle, which come back to the last bit."""
+        return Gaussians.from_arrays, (self.means, self.scales, self.quats, self.opacities, self.sh)
+
+    def __copy__(self) -> Gaussians:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any], /) -> Gaussians:
+        return self
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Gaussians):
+            return NotImplemented
+        names = ("means", "scales", "quats", "opacities", "sh")
+        return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in names)
+
+    def __hash__(self) -> int:
+        return hash((len(self), self.sh_degree, tuple(self.means[:1].ravel().tolist())))
+
     def __repr__(self) -> str:
         return f"Gaussians({len(self)}, sh_degree={self.sh_degree})"
 
@@ -1047,6 +1125,9 @@ class Gaussians:
 class Renderer(_Handle):
     """Gaussians made ready to be drawn many times: backend is "auto", "cpu" or "gpu". Any number of threads may use one
     at a time."""
+
+    _holds = "working memory of this process"
+    _way_out = "elsewhere a new one is made of its Gaussians: Renderer(gaussians, backend)"
 
     def __init__(
         self,
@@ -1056,9 +1137,9 @@ class Renderer(_Handle):
     ) -> None:
         options = _initial(vg_renderer_options)
         options.backend = _choice(Backend, "backend", backend)
-        options.context = None if context is None else context._as_parameter_
+        options.context = _lent_context(context)
         made = ct.c_void_p()
-        _call("vg_renderer_new", gaussians._handle, ct.byref(options), ct.byref(made))
+        _call("vg_renderer_new", _lent_gaussians(gaussians), ct.byref(options), ct.byref(made))
         super().__init__("renderer", made)
 
     @property
@@ -1081,9 +1162,9 @@ class Renderer(_Handle):
     ) -> npt.NDArray[np.uint8]:
         """Pictures of cameras of one size: uint8 (n, height, width, 3), or 4 with straight alpha on a "transparent"
         background."""
-        posed = [_camera(camera) for camera in cameras]
+        posed = [_camera(camera, f"cameras[{i}]") for i, camera in enumerate(listed(cameras, "cameras"))]
         if len({(camera.width, camera.height) for camera in posed}) != 1:
-            raise VgError(Status.ARGUMENT, f"cameras: {len(posed)} of several sizes or none; allowed: of one size")
+            raise bad_value("cameras", f"{len(posed)} of several sizes or none", "of one size")
         options = _render_options(background, antialiased, context)
         opaque = options.background == Background.COLOR
         format, channels = (Format.RGB8, 3) if opaque else (Format.RGBA8, 4)
@@ -1099,35 +1180,42 @@ class Renderer(_Handle):
 
 def _render_options(background: str | Sequence[float], antialiased: bool, context: Context | None) -> vg_render_options:
     options: vg_render_options = _initial(vg_render_options)
-    options.context = None if context is None else context._as_parameter_
+    options.context = _lent_context(context)
     options.antialiased = antialiased
     if isinstance(background, str) and background == "transparent":
         options.background = Background.TRANSPARENT
         return options
     named: dict[Any, Sequence[float]] = {"white": (1, 1, 1), "black": (0, 0, 0)}
-    color = named.get(background, ()) if isinstance(background, str) else background
-    if len(color) != 3:
-        allowed = "white, black, transparent, or (r, g, b) from 0 to 1"
-        raise VgError(Status.ARGUMENT, f"background: {background!r}; allowed: {allowed}")
-    options.background_color[:] = color
+    allowed = "white, black, transparent, or (r, g, b) from 0 to 1"
+    if isinstance(background, str) and background not in named:
+        raise bad_value("background", repr(background), allowed)
+    color = doubles(named[background] if isinstance(background, str) else background, "background")
+    if color.shape != (3,):
+        raise bad_value("background", f"shape {color.shape}", allowed)
+    options.background_color[:] = color.tolist()
     return options
 
 
+@equal_by_value
 class Points(NamedTuple):
     """The metric coloured point cloud."""
 
-    #: Metres, float32 (n, 3).
     positions: npt.NDArray[np.float32]
-    #: sRGB, uint8 (n, 3).
+    """Metres, float32 (n, 3)."""
     colors: npt.NDArray[np.uint8]
+    """sRGB, uint8 (n, 3)."""
 
 
+@equal_by_value
 class Reconstruction(NamedTuple):
     """A finished reconstruction."""
 
     gaussians: Gaussians
+    """The vehicle."""
     report: dict[str, Any]
+    """What was done, how long it took, what was left out and why."""
     points: Points | None
+    """The point cloud, if asked for."""
 
 
 def reconstruct(
@@ -1146,7 +1234,7 @@ def reconstruct(
     cloud: npt.NDArray[np.float32] | None = None,
     vehicle_size: Sequence[float] | None = None,
     sh_degree: int = 2,
-    keep: Keep | int = 0,
+    keep: Keep | int | str | Iterable[str] = 0,
     check: bool = True,
     points: bool = False,
     budget: float | None = None,
@@ -1165,13 +1253,13 @@ def reconstruct(
 
     Pictures whose pixels lie together are read where they are, whatever lies between their rows.
     """
-    images, cameras = list(images), list(cameras)
+    images, cameras = listed(images, "images", 3), listed(cameras, "cameras")
     n = len(images)
     columns: dict[str, list[Any]] = {
         "cameras": cameras,
-        "masks": [None] * n if masks is None else list(masks),
-        "depths": [None] * n if depths is None else list(depths),
-        "names": [f"{i:03}" for i in range(n)] if names is None else list(names),
+        "masks": [None] * n if masks is None else listed(masks, "masks", 2),
+        "depths": [None] * n if depths is None else listed(depths, "depths", 2),
+        "names": [f"{i:03}" for i in range(n)] if names is None else listed(names, "names"),
     }
     for argument, column in columns.items():
         if len(column) != n:
@@ -1180,16 +1268,16 @@ def reconstruct(
     views = (vg_view * n)()
     for i, image in enumerate(images):
         views[i] = _initial(vg_view)
-        views[i].name = columns["names"][i].encode()
-        views[i].camera = _camera(cameras[i])
+        views[i].name = _name(columns["names"][i], f"names[{i}]")
+        views[i].camera = _camera(cameras[i], f"cameras[{i}]")
         views[i].image = _photograph(image, f"images[{i}]", alive)
         if columns["masks"][i] is not None:
             views[i].mask = _mask(columns["masks"][i], f"masks[{i}]", alive)
         if columns["depths"][i] is not None:
-            views[i].depth = _plane(columns["depths"][i], f"depths[{i}]", np.float32, Format.DEPTH32F, alive)
+            views[i].depth = _depth(columns["depths"][i], f"depths[{i}]", alive)
 
     options = _initial(vg_options)
-    options.context = None if context is None else context._as_parameter_
+    options.context = _lent_context(context)
     options.prior, options.symmetry = _choice(Prior, "prior", prior), _choice(Symmetry, "symmetry", symmetry)
     # Referred to by this call's arguments until it returns.
     options.prior_model = _lent_model(prior_model, "prior_model")
@@ -1199,34 +1287,28 @@ def reconstruct(
     if budget is not None:
         # Of C, 0 is none.
         if budget == 0:
-            raise VgError(Status.ARGUMENT, f"budget: {budget}; allowed: seconds above 0")
-        options.budget_s = budget
-    options.resolution = resolution
+            raise bad_value("budget", budget, "seconds above 0")
+        options.budget_s = real(budget, "budget")
+    options.resolution = real(resolution, "resolution")
     if max_views is not None:
         # Of C, 0 is all.
-        if max_views < 1:
-            raise VgError(Status.ARGUMENT, f"max_views: {max_views}; allowed: at least 1")
-        options.max_views = max_views
+        options.max_views = whole(max_views, "max_views", 1, sys.maxsize, "at least 1")
     if refine_iterations is not None:
         # Of C, 0 is none.
-        if not 1 <= refine_iterations < 1 << 32:
-            allowed = "1 to 1000000"
-            raise VgError(Status.ARGUMENT, f"refine_iterations: {refine_iterations}; allowed: {allowed}")
-        options.refine_iterations = refine_iterations
+        options.refine_iterations = whole(refine_iterations, "refine_iterations", 1, _U32, "1 to 1000000")
     if refine_seconds is not None:
         if refine_seconds == 0:
-            raise VgError(Status.ARGUMENT, f"refine_seconds: {refine_seconds}; allowed: above 0, at most 86400")
-        options.refine_seconds = refine_seconds
+            raise bad_value("refine_seconds", refine_seconds, "above 0, at most 86400")
+        options.refine_seconds = real(refine_seconds, "refine_seconds")
     options.refine_hold_out = refine_hold_out
     options.refine_backend = _choice(Backend, "refine_backend", refine_backend)
     if cloud is not None:
-        _expect(cloud, "cloud", np.float32)
-        if cloud.ndim != 2 or cloud.shape[1] != 3:
-            raise VgError(Status.ARGUMENT, f"cloud: shape {cloud.shape}; allowed: (n, 3)")
-        alive.append(np.require(cloud, requirements=["C", "A"]))
-        options.cloud, options.cloud_count = alive[-1].ctypes.data, len(cloud)
-    options.sh_degree, options.keep, options.check, options.points = sh_degree, keep, check, points
-    options.vehicle_size[:] = (0, 0, 0) if vehicle_size is None else vehicle_size
+        alive.append(_measured(cloud, "cloud"))
+        options.cloud, options.cloud_count = alive[-1].ctypes.data, len(alive[-1])
+    options.sh_degree, options.keep = whole(sh_degree, "sh_degree", 0, 3), _kept(keep)
+    options.check, options.points = check, points
+    if vehicle_size is not None:
+        options.vehicle_size[:] = doubles(vehicle_size, "vehicle_size", (3,)).tolist()
     raised: list[BaseException] = []
 
     def on_progress(stage: bytes, fraction: float, _: object) -> int:
@@ -1293,46 +1375,78 @@ def _logger(
 
 
 def _choice(choices: type[enum.IntEnum], argument: str, name: str) -> int:
+    allowed = ", ".join(choices.__members__).lower()
+    if not isinstance(name, str):
+        raise bad_type(argument, name, allowed)
     member = choices.__members__.get(name.upper())
     if member is None:
-        allowed = ", ".join(choices.__members__).lower()
-        raise VgError(Status.ARGUMENT, f"{argument}: {name!r}; allowed: {allowed}")
+        raise bad_value(argument, repr(name), allowed)
     return int(member)
+
+
+def _kept(keep: Keep | int | str | Iterable[str]) -> int:
+    """Bits of Keep; also by the words of vehicle_gaussians.reconstruct."""
+    if isinstance(keep, int):
+        return whole(keep, "keep", 0, int(~Keep(0)), "bits of Keep, 0 to 31")
+    words = {member.lower().replace("_", "-"): bit for member, bit in Keep.__members__.items()}
+    words["all"] = ~Keep(0)
+    bits = Keep(0)
+    for word in [keep] if isinstance(keep, str) else listed(keep, "keep"):
+        if word not in words:
+            raise bad_value("keep", repr(word), ", ".join(words))
+        bits |= words[word]
+    return int(bits)
+
+
+def _name(name: str, argument: str) -> bytes:
+    if not isinstance(name, str):
+        raise bad_type(argument, name, "text")
+    return name.encode()
 
 
 def _lent_model(model: Model | None, argument: str) -> int | None:
     if model is not None and not isinstance(model, Model):
-        raise TypeError(f"{argument}: {type(model).__name__}; allowed: a Model")
+        raise bad_type(argument, model, "a Model")
     return None if model is None else model._as_parameter_
 
 
-def _expect(array: Any, argument: str, *dtypes: npt.DTypeLike) -> None:
+def _expect(array: Any, argument: str, way_out: str, *dtypes: npt.DTypeLike) -> None:
     if not isinstance(array, np.ndarray) or all(array.dtype != np.dtype(d) for d in dtypes):
-        found = f"array of {array.dtype}" if isinstance(array, np.ndarray) else type(array).__name__
-        allowed = " or ".join(str(np.dtype(d)) for d in dtypes)
-        raise TypeError(f"{argument}: {found}; allowed: a NumPy array of {allowed}")
+        raise bad_type(argument, array, f"a NumPy array of {' or '.join(str(np.dtype(d)) for d in dtypes)}; {way_out}")
 
 
 def _photograph(array: npt.NDArray[np.uint8], argument: str, alive: list[Any]) -> vg_image:
-    _expect(array, argument, np.uint8)
+    _expect(array, argument, "floats of 0 to 1 become one by (255 * image).round().astype(np.uint8)", np.uint8)
     formats = {3: Format.RGB8, 4: Format.RGBA8}
     if array.ndim != 3 or array.shape[2] not in formats:
-        raise VgError(Status.ARGUMENT, f"{argument}: shape {array.shape}; allowed: (height, width, 3 or 4)")
+        raise bad_value(argument, f"shape {array.shape}", "(height, width, 3 or 4)")
     return _lent(array, formats[array.shape[2]], alive)
 
 
 def _mask(array: npt.NDArray[Any], argument: str, alive: list[Any]) -> vg_image:
-    _expect(array, argument, np.uint8, np.bool_)
+    _expect(array, argument, "others become one by a comparison: mask > 0.5", np.uint8, np.bool_)
     if array.dtype == np.bool_:
         array = np.where(array, np.uint8(255), np.uint8(0))
-    return _plane(array, argument, np.uint8, Format.GRAY8, alive)
+    return _plane(array, argument, Format.GRAY8, alive)
 
 
-def _plane(array: npt.NDArray[Any], argument: str, dtype: npt.DTypeLike, format: Format, alive: list[Any]) -> vg_image:
-    _expect(array, argument, dtype)
+def _depth(array: npt.NDArray[Any], argument: str, alive: list[Any]) -> vg_image:
+    allowed = "an array of floats, metres, (height, width); millimetres become one by depth.astype(np.float32) / 1000"
+    return _plane(floats(array, argument, allowed), argument, Format.DEPTH32F, alive)
+
+
+def _plane(array: npt.NDArray[Any], argument: str, format: Format, alive: list[Any]) -> vg_image:
     if array.ndim != 2:
-        raise VgError(Status.ARGUMENT, f"{argument}: shape {array.shape}; allowed: (height, width)")
+        raise bad_value(argument, f"shape {array.shape}", "(height, width)")
     return _lent(array, format, alive)
+
+
+def _measured(points: npt.ArrayLike, argument: str) -> npt.NDArray[np.float32]:
+    """Points in metres, (n, 3), in row order."""
+    array = floats(points, argument, "an array of floats, metres, (n, 3)")
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise bad_value(argument, f"shape {array.shape}", "(n, 3)")
+    return np.require(array, requirements=["C", "A"])
 
 
 def _lent(array: npt.NDArray[Any], format: Format, alive: list[Any]) -> vg_image:
@@ -1356,7 +1470,7 @@ def segment(
     _lent_model(model, "model")
     alive: list[Any] = []
     picture, posed, options = _photograph(image, "image", alive), _camera(camera), _initial(vg_segment_options)
-    options.context = None if context is None else context._as_parameter_
+    options.context = _lent_context(context)
     mask = np.empty((picture.height, picture.width), np.uint8)
     _call("vg_segment", model, ct.byref(picture), ct.byref(posed), ct.byref(options), mask.ctypes.data, 0)
     return mask
@@ -1364,8 +1478,8 @@ def segment(
 
 def _metrics_options(lpips: Model | None, f_score: float, context: Context | None) -> vg_metrics_options:
     options: vg_metrics_options = _initial(vg_metrics_options)
-    options.context = None if context is None else context._as_parameter_
-    options.lpips, options.f_score_m = _lent_model(lpips, "lpips"), f_score
+    options.context = _lent_context(context)
+    options.lpips, options.f_score_m = _lent_model(lpips, "lpips"), real(f_score, "f_score")
     return options
 
 
@@ -1376,11 +1490,11 @@ def _measures(errors: ct.Structure) -> list[float | None]:
 
 
 def _picture(array: npt.NDArray[Any], argument: str, alive: list[Any]) -> vg_image:
-    _expect(array, argument, np.uint8, np.float32)
-    if array.dtype == np.uint8:
+    if isinstance(array, np.ndarray) and array.dtype == np.uint8:
         return _photograph(array, argument, alive)
+    array = floats(array, argument, "a NumPy array of uint8 or floats, (height, width, 3) or (height, width, 4)")
     if array.ndim != 3 or array.shape[2] not in (3, 4):
-        raise VgError(Status.ARGUMENT, f"{argument}: shape {array.shape}; allowed: (height, width, 3 or 4)")
+        raise bad_value(argument, f"shape {array.shape}", "(height, width, 3 or 4)")
     if array.shape[2] == 3:
         array = np.concatenate([array, np.ones_like(array[..., :1])], axis=2)
     return _lent(array, Format.RGBA32F, alive)
@@ -1417,9 +1531,9 @@ def view_errors(
     if mask is not None:
         view.mask = _mask(mask, "mask", alive)
     if depth is not None:
-        view.depth = _plane(depth, "depth", np.float32, Format.DEPTH32F, alive)
+        view.depth = _depth(depth, "depth", alive)
     options, errors = _metrics_options(lpips, 0.05, context), _initial(vg_view_errors)
-    _call("vg_metrics_view", gaussians._handle, ct.byref(view), ct.byref(options), ct.byref(errors))
+    _call("vg_metrics_view", _lent_gaussians(gaussians), ct.byref(view), ct.byref(options), ct.byref(errors))
     return ViewErrors(*_measures(errors))  # type: ignore[arg-type]
 
 
@@ -1430,20 +1544,16 @@ def surface_errors(
 
     f_score: the distance below which a point counts as met, metres.
     """
-    _expect(points, "points", np.float32)
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise VgError(Status.ARGUMENT, f"points: shape {points.shape}; allowed: (n, 3)")
-    points = np.require(points, requirements=["C", "A"])
+    scan = _measured(points, "points")
     options, errors = _metrics_options(None, f_score, context), _initial(vg_surface_errors)
-    _call(
-        "vg_metrics_surface", gaussians._handle, points.ctypes.data, len(points), ct.byref(options), ct.byref(errors)
-    )
+    lists = (_lent_gaussians(gaussians), scan.ctypes.data, len(scan))
+    _call("vg_metrics_surface", *lists, ct.byref(options), ct.byref(errors))
     return SurfaceErrors(*_measures(errors))  # type: ignore[arg-type]
 
 
 def _align_options(heading: str, context: Context | None) -> vg_align_options:
     options: vg_align_options = _initial(vg_align_options)
-    options.context = None if context is None else context._as_parameter_
+    options.context = _lent_context(context)
     options.heading = _choice(Heading, "heading", heading)
     return options
 
@@ -1451,36 +1561,33 @@ def _align_options(heading: str, context: Context | None) -> vg_align_options:
 def _alignment(found: vg_alignment) -> Alignment:
     matrix = np.array(found.vehicle_from_world).reshape(4, 4)
     residual_px, other_px = (None if value != value else value for value in (found.residual_px, found.other_px))
-    return Alignment(
-        matrix, found.scale, found.residual_m, found.confidence, residual_px, other_px, found.used_count
-    )
+    return Alignment(matrix, found.scale, found.residual_m, found.confidence, residual_px, other_px, found.used_count)
 
 
 def _masked_views(
     masks: Sequence[npt.NDArray[Any] | None], cameras: Sequence[Camera], names: Sequence[str] | None, alive: list[Any]
 ) -> ct.Array[vg_view]:
+    masks, cameras = listed(masks, "masks", 2), listed(cameras, "cameras")
+    names = None if names is None else listed(names, "names")
     for argument, entries in (("masks", masks), ("names", names)):
         if entries is not None and len(entries) != len(cameras):
-            allowed = f"one for each of {len(cameras)} cameras"
-            raise VgError(Status.ARGUMENT, f"{argument}: {len(entries)}; allowed: {allowed}")
+            raise bad_value(argument, len(entries), f"one for each of {len(cameras)} cameras")
     views = (vg_view * len(cameras))()
     for i, (mask, camera) in enumerate(zip(masks, cameras, strict=True)):
         views[i] = _initial(vg_view)
-        views[i].camera = _camera(camera)
-        views[i].name = (names[i] if names is not None else f"{i:03}").encode()
+        views[i].camera = _camera(camera, f"cameras[{i}]")
+        views[i].name = _name(names[i] if names is not None else f"{i:03}", f"names[{i}]")
         if mask is not None:
             views[i].mask = _mask(mask, f"masks[{i}]", alive)
     return views
 
 
-def _points(points: npt.ArrayLike | None, argument: str, dtype: type) -> npt.NDArray[Any]:
-    """(n, 3) in row order; none for None."""
-    array = np.require([] if points is None else points, dtype, ["C", "A"])
-    if points is None:
-        array = array.reshape(0, 3)
+def _points(points: npt.ArrayLike | None, argument: str) -> npt.NDArray[np.float64]:
+    """Points of any unit, (n, 3), in row order; none for None."""
+    array = np.zeros((0, 3)) if points is None else doubles(points, argument)
     if array.ndim != 2 or array.shape[1] != 3:
-        raise VgError(Status.ARGUMENT, f"{argument}: shape {array.shape}; allowed: (n, 3)")
-    return array
+        raise bad_value(argument, f"shape {array.shape}", "(n, 3)")
+    return np.require(array, requirements=["C", "A"])
 
 
 def align_scan(
@@ -1494,10 +1601,9 @@ def align_scan(
     context: Context | None = None,
 ) -> Alignment:
     """The vehicle's frame by points scanned on the vehicle; the arguments are those of vehicle_gaussians.align_scan."""
-    _expect(scan, "scan", np.float32)
     alive: list[Any] = []
     views, found = _masked_views(masks, cameras, names, alive), _initial(vg_alignment)
-    world, scanned = _points(sparse, "sparse", np.float64), _points(scan, "scan", np.float32)
+    world, scanned = _points(sparse, "sparse"), _measured(scan, "scan")
     lists = (views, len(views), world.ctypes.data, len(world), scanned.ctypes.data, len(scanned))
     _call("vg_align_scan", *lists, ct.byref(_align_options(heading, context)), ct.byref(found))
     return _alignment(found)
@@ -1516,7 +1622,7 @@ def align_box(
     """The vehicle's frame by its size and the ground; the arguments are those of vehicle_gaussians.align_box."""
     alive: list[Any] = []
     views, found = _masked_views(masks, cameras, names, alive), _initial(vg_alignment)
-    world, sides = _points(sparse, "sparse", np.float64), _doubles(size, (3,))
+    world, sides = _points(sparse, "sparse"), doubles(size, "size", (3,))
     lists = (views, len(views), world.ctypes.data, len(world), sides.ctypes.data)
     _call("vg_align_box", *lists, ct.byref(_align_options(heading, context)), ct.byref(found))
     return _alignment(found)
@@ -1524,9 +1630,9 @@ def align_box(
 
 def align_points(world: npt.ArrayLike, vehicle: npt.ArrayLike) -> Alignment:
     """The similarity between points known in both frames; the arguments are those of vehicle_gaussians.align_points."""
-    source, target = _points(world, "world", np.float64), _points(vehicle, "vehicle", np.float64)
+    source, target = _points(world, "world"), _points(vehicle, "vehicle")
     if len(source) != len(target):
-        raise VgError(Status.ARGUMENT, f"vehicle: {len(target)}; allowed: as many as world, {len(source)}")
+        raise bad_value("vehicle", len(target), f"as many as world, {len(source)}")
     found, kept = _initial(vg_alignment), np.zeros(len(source), np.bool_)
     residuals = np.empty(len(source))
     lists = (source.ctypes.data, target.ctypes.data, len(source))
@@ -1548,15 +1654,20 @@ def align_folder(
     return _alignment(found)
 
 
+@equal_by_value
 class Scene(NamedTuple):
     """Views of one vehicle, a list entry each; the arrays are read-only views of the library's memory."""
 
     images: list[npt.NDArray[np.uint8]]
-    #: 255 is vehicle.
+    """RGB, uint8 (height, width, 3)."""
     masks: list[npt.NDArray[np.uint8] | None]
+    """255 is vehicle, (height, width); None where there is no mask."""
     depths: list[npt.NDArray[np.float32] | None]
+    """Metres along the optical axis, 0 for none, float32 (height, width); None where there is no depth map."""
     cameras: list[vg_camera]
+    """Posed in the vehicle's frame."""
     names: list[str]
+    """The pictures' paths below their images folder."""
 
 
 def open_scene(
@@ -1571,14 +1682,15 @@ def open_scene(
     """Opens a transforms.json, a folder with one, or a COLMAP folder; the arguments are those of
     vehicle_gaussians.open_scene. What is legal but looks like a mistake is a warning."""
     options = _initial(vg_scene_options)
-    options.context = None if context is None else context._as_parameter_
-    world = _optional_doubles(vehicle_from_world, (4, 4))
+    options.context = _lent_context(context)
+    world = _similarity(vehicle_from_world)
     options.vehicle_from_world = _address(world)
-    wanted = [] if views is None else [name.encode() for name in views]
+    asked = [] if views is None else [views] if isinstance(views, str) else listed(views, "views")
+    wanted = [_name(name, f"views[{i}]") for i, name in enumerate(asked)]
     names = (ct.c_char_p * len(wanted))(*wanted)
     if wanted:
         options.names, options.name_count = names, len(wanted)
-    options.depth_scale, options.load_depth = depth_scale or 0.0, load_depth
+    options.depth_scale, options.load_depth = real(depth_scale or 0.0, "depth_scale"), load_depth
     notes: list[str] = []
     raised: list[BaseException] = []
     options.log = LogFn(_logger(lambda _, note: notes.append(note), raised))

@@ -1,7 +1,7 @@
 """Pictures that PyTorch can differentiate.
 
 >>> from vehicle_gaussians.torch import render
->>> picture = render(means, rotations, scales, opacities, sh, camera)
+>>> picture = render(means, quats, scales, opacities, sh, camera)
 >>> (picture.color - photograph).square().mean().backward()
 
 Drawing is done by the library, on the processor, and so is the way back; PyTorch is needed by this module alone:
@@ -17,8 +17,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ._errors import Status, VgError
+from ._arguments import bad_type
+from ._errors import ArgumentTypeError, Status, VgError
 from ._native import Camera, Gaussians
+from ._types import Backend, Background, DepthMode
 
 try:
     import torch
@@ -35,35 +37,35 @@ __all__ = ["Picture", "render"]
 class Picture(NamedTuple):
     """What was drawn, as float32 tensors that can be differentiated."""
 
-    #: sRGB-encoded, over the background; premultiplied by alpha where that is transparent. (height, width, 3)
     color: torch.Tensor
-    #: How much of the pixel the vehicle covers, 0 to 1, whatever the background. (height, width)
+    """sRGB-encoded, over the background; premultiplied by alpha where that is transparent. (height, width, 3)"""
     alpha: torch.Tensor
-    #: Metres along the optical axis, 0 where there is nothing. (height, width)
+    """How much of the pixel the vehicle covers, 0 to 1, whatever the background. (height, width)"""
     depth: torch.Tensor
+    """Metres along the optical axis, 0 where there is nothing. (height, width)"""
 
 
 def render(
     means: torch.Tensor,
-    rotations: torch.Tensor,
+    quats: torch.Tensor,
     scales: torch.Tensor,
     opacities: torch.Tensor,
     sh: torch.Tensor,
     camera: Camera,
     *,
-    background: str | torch.Tensor = "white",
+    background: Literal["white", "black", "transparent"] | torch.Tensor = "white",
     pose: torch.Tensor | None = None,
     antialiased: bool = False,
     near: float = 0.01,
     far: float = 1e10,
     sh_degree: int = 3,
-    depth_mode: Literal["expected", "accumulated"] = "expected",
-    backend: Literal["auto", "cpu", "gpu"] = "auto",
+    depth_mode: DepthMode = "expected",
+    backend: Backend = "auto",
     threads: int = 0,
 ) -> Picture:
     """Draws Gaussians as a camera sees them; gradients go to every tensor that requires them.
 
-    Of n Gaussians: means (n, 3) and scales (n, 3), standard deviations, in metres; rotations (n, 4), quaternions
+    Of n Gaussians: means (n, 3) and scales (n, 3), standard deviations, in metres; quats (n, 4), quaternions
     (w, x, y, z) of any norm but zero, which are normalised on the way and the gradient with them; opacities (n,) from
     0 to 1; sh (n, (degree + 1)^2, 3).
 
@@ -80,7 +82,7 @@ def render(
         raise VgError(Status.ARGUMENT, f"sh: shape {tuple(sh.shape)}; allowed: (n, K, 3) with K = 1, 4, 9 or 16")
     shapes = {
         "means": (means, (count, 3)),
-        "rotations": (rotations, (count, 4)),
+        "quats": (quats, (count, 4)),
         "scales": (scales, (count, 3)),
         "opacities": (opacities, (count,)),
         "sh": (sh, (count, bands, 3)),
@@ -90,11 +92,11 @@ def render(
     if isinstance(background, torch.Tensor):
         _expect(background, "background", (3,))
     elif not isinstance(background, str):
-        raise TypeError(f"background: {type(background).__name__}; allowed: a name, or a tensor of shape (3,)")
+        raise bad_type("background", background, "a name, or a tensor of shape (3,)")
     if pose is not None:
         _expect(pose, "pose", (6,))
     if not isinstance(camera, Camera):
-        raise TypeError(f"camera: {type(camera).__name__}; allowed: a vehicle_gaussians.Camera")
+        raise bad_type("camera", camera, "a vehicle_gaussians.Camera")
     settings = {
         "antialiased": antialiased,
         "near": near,
@@ -104,7 +106,7 @@ def render(
         "backend": backend,
         "threads": threads,
     }
-    drawn = _Render.apply(means, rotations, scales, opacities, sh, background, pose, camera, settings)
+    drawn = _Render.apply(means, quats, scales, opacities, sh, background, pose, camera, settings)
     return Picture(*drawn)
 
 
@@ -113,7 +115,7 @@ class _Render(torch.autograd.Function):
     def forward(
         ctx: Any,
         means: torch.Tensor,
-        rotations: torch.Tensor,
+        quats: torch.Tensor,
         scales: torch.Tensor,
         opacities: torch.Tensor,
         sh: torch.Tensor,
@@ -124,13 +126,13 @@ class _Render(torch.autograd.Function):
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         # Saved by PyTorch, so that it notices what is changed in place, and frees them after the way back.
         ctx.save_for_backward(
-            *(means, rotations, scales, opacities, sh),
+            *(means, quats, scales, opacities, sh),
             background if isinstance(background, torch.Tensor) else None,
             pose,
         )
         ctx.background, ctx.camera, ctx.settings = background, camera, settings
         ctx.set_materialize_grads(False)
-        arrays = (means, rotations, scales, opacities, sh)
+        arrays = (means, quats, scales, opacities, sh)
         gaussians, placed, behind = _scene(arrays, camera, background, pose)
         planes = gaussians.render_planes(placed, behind, **settings)
         color, alpha, depth = (torch.from_numpy(plane) for plane in planes)
@@ -149,10 +151,10 @@ class _Render(torch.autograd.Function):
         made = gaussians.render_backward(placed, color, alpha, depth, behind, **ctx.settings)
         # The library's gradient is perpendicular to the unit quaternion q / |q|: what is left of the chain is 1 / |q|.
         norms = np.linalg.norm(_numpy(arrays[1]).astype(np.float64), axis=1, keepdims=True)
-        rotations = made.quats / norms
+        quats = made.quats / norms
         values = (
             made.means,
-            rotations,
+            quats,
             made.scales,
             made.opacities,
             made.sh,
@@ -167,12 +169,15 @@ class _Render(torch.autograd.Function):
 
 
 def _scene(
-    arrays: Any, camera: Camera, background: str | torch.Tensor, pose: torch.Tensor | None
-) -> tuple[Gaussians, Camera, str | npt.NDArray[np.float32]]:
-    means, rotations, scales, opacities, sh = (_numpy(array) for array in arrays)
-    gaussians = Gaussians.from_arrays(means, scales, rotations, opacities, sh)
+    arrays: Any,
+    camera: Camera,
+    background: Literal["white", "black", "transparent"] | torch.Tensor,
+    pose: torch.Tensor | None,
+) -> tuple[Gaussians, Camera, Background]:
+    means, quats, scales, opacities, sh = (_numpy(array) for array in arrays)
+    gaussians = Gaussians.from_arrays(means, scales, quats, opacities, sh)
     placed = camera if pose is None else camera.with_pose(_moved(camera.vehicle_from_camera, _numpy(pose)))
-    return gaussians, placed, background if isinstance(background, str) else _numpy(background)
+    return gaussians, placed, _numpy(background) if isinstance(background, torch.Tensor) else background
 
 
 def _numpy(tensor: torch.Tensor) -> npt.NDArray[np.float32]:
@@ -222,13 +227,16 @@ def _right_jacobian(w: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 def _expect(tensor: object, argument: str, shape: tuple[int, ...]) -> None:
     if not isinstance(tensor, torch.Tensor):
-        raise TypeError(f"{argument}: {type(tensor).__name__}; allowed: a torch.Tensor of float32 on the CPU")
+        raise bad_type(argument, tensor, "a torch.Tensor of float32 on the CPU")
+    wrong = None
     if tensor.dtype != torch.float32:
-        raise TypeError(f"{argument}: tensor of {tensor.dtype}; allowed: torch.float32, see .float()")
-    if tensor.device.type != "cpu":
-        raise TypeError(f"{argument}: tensor on {tensor.device}; allowed: on the CPU, see .cpu()")
-    if tensor.layout != torch.strided:
-        raise TypeError(f"{argument}: tensor of layout {tensor.layout}; allowed: torch.strided, see .to_dense()")
+        wrong = f"of {tensor.dtype}; allowed: torch.float32, see .float()"
+    elif tensor.device.type != "cpu":
+        wrong = f"on {tensor.device}; allowed: on the CPU, see .cpu()"
+    elif tensor.layout != torch.strided:
+        wrong = f"of layout {tensor.layout}; allowed: torch.strided, see .to_dense()"
+    if wrong is not None:
+        raise ArgumentTypeError(Status.ARGUMENT, f"{argument}: tensor {wrong}")
     if tuple(tensor.shape) != shape:
         wanted = str(shape).replace("-1", "n")
         raise VgError(Status.ARGUMENT, f"{argument}: shape {tuple(tensor.shape)}; allowed: {wanted}")
