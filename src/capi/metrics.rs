@@ -195,7 +195,8 @@ pub unsafe extern "C" fn vg_surface_errors_init(errors: *mut vg_surface_errors, 
 
 /// Compares two pictures.
 ///
-/// - a, b: RGB8, BGR8, RGBA8, BGRA8, GRAY8 or RGBA32F, of one size; what their alpha leaves open is white. Not NULL.
+/// - a, b: RGB8, BGR8, RGBA8, BGRA8, GRAY8 or RGBA32F, of one size; what their alpha leaves open is white. Floats are
+///   0 to 1, and what is more than 1 beyond is an error. Not NULL.
 /// - options: NULL for the default values.
 /// - out: a struct that `vg_picture_errors_init` was called for; unchanged on failure.
 /// - out_error: NULL, or receives the error.

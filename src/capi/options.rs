@@ -19,7 +19,8 @@ use std::ffi::{CString, c_char, c_void};
 #[repr(i32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum vg_prior {
-    /// `VG_PRIOR_GIVEN` if every used view has depth, else `VG_PRIOR_SHAPE`.
+    /// `VG_PRIOR_GIVEN` if every used view has depth, else `VG_PRIOR_SHAPE`. Where some views have depth, it counts as
+    /// measured points, to which the shape bends, and `log` is told.
     Auto = 0,
     /// The depth in the views.
     Given = 1,

@@ -74,6 +74,10 @@ unsafe fn run(
 
 unsafe fn log(log: Log, report: &Report) {
     unsafe {
+        let of_network = report.network.iter().flat_map(|network| &network.warnings);
+        for warning in report.warnings.iter().chain(of_network) {
+            log.line(vg_log_level::Warning, || warning.clone());
+        }
         for left in &report.left_out {
             log.line(vg_log_level::Info, || format!("left out {} {}: {}", left.count, left.what, left.why));
         }

@@ -70,6 +70,7 @@ pub(super) fn reconstruct(
         network: None,
         plan: None,
         left_out,
+        warnings: Vec::new(),
         symmetry: completion,
         relight: None,
         refinement: Some(refinement),

@@ -5,7 +5,7 @@ use super::cost::{self, Load};
 use super::machine::Machine;
 use super::options::{Calibrate, Options, PriorChoice};
 use super::plan::note;
-use super::report::LeftOut;
+use super::report::{LeftOut, Stage};
 use crate::progress::Context;
 use crate::relight::Relight;
 use crate::scene::Scene;
@@ -28,6 +28,16 @@ pub struct BudgetPlan {
     pub machine: Machine,
     /// What was chosen, the same as in the report's `settings`.
     pub chosen: Chosen,
+}
+
+impl BudgetPlan {
+    /// What to say where a run with these stages took longer than the budget. A refinement is beside it.
+    pub(super) fn overrun(&self, stages: &[Stage]) -> Option<String> {
+        let took_s: f64 = 1e-3 * stages.iter().filter(|s| s.name != "refine").map(|s| s.ms).sum::<f64>();
+        let why = if self.fits { "" } else { ", though all was left out that can be" };
+        (took_s > self.budget_s)
+            .then(|| format!("budget: {} s was not kept: the call took {took_s:.2} s{why}", self.budget_s))
+    }
 }
 
 /// The options that a budget decides on.
@@ -224,6 +234,26 @@ mod tests {
         }
         let given = candidates(&Options::default(), &car(4, true), MACHINE);
         assert!(given.iter().all(|(options, _)| options.prior == PriorChoice::Auto));
+    }
+
+    #[test]
+    fn a_run_that_took_longer_than_its_budget_without_the_refinement_is_said() {
+        let stage = |name, ms| Stage { name, ms };
+        let stages = [stage("prior", 700.0), stage("refine", 9000.0), stage("check", 400.0)];
+        let plan = |budget_s, fits| BudgetPlan {
+            budget_s,
+            predicted_s: 1.0,
+            fits,
+            machine: MACHINE,
+            chosen: Chosen::of(&Options::default()),
+        };
+        assert_eq!(plan(1.2, true).overrun(&stages), None);
+        let said = plan(0.5, false).overrun(&stages).unwrap();
+        assert_eq!(
+            said,
+            "budget: 0.5 s was not kept: the call took 1.10 s, though all was left out that can be"
+        );
+        assert!(plan(1.0, true).overrun(&stages).unwrap().ends_with("took 1.10 s"));
     }
 
     #[test]

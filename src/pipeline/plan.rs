@@ -5,7 +5,7 @@ use super::report::LeftOut;
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::prior::{Geometry, PointFit};
-use crate::scene::{Cloud, Scene, View};
+use crate::scene::{Scene, View};
 use glam::DVec3;
 
 /// Cameras nearer to each other than this, looking the same way, show the same.
@@ -101,11 +101,11 @@ pub(super) fn sh_degree(
     degree
 }
 
-/// Points of the cloud that moved no surface.
-pub(super) fn note_cloud(left_out: &mut Vec<LeftOut>, cloud: &Cloud, fit: Option<PointFit>) {
+/// Points of a cloud of `count` that moved no surface.
+pub(super) fn note_cloud(left_out: &mut Vec<LeftOut>, count: usize, fit: Option<PointFit>) {
     match fit {
         Some(fit) => note(left_out, "points", "outside the silhouettes: not the vehicle's", fit.outside),
-        None => note(left_out, "points", "the depth is given, not estimated", cloud.points().len()),
+        None => note(left_out, "points", "the depth is given, not estimated", count),
     }
 }
 

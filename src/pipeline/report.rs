@@ -102,6 +102,8 @@ pub struct Report {
     pub plan: Option<BudgetPlan>,
     /// Work this scene did not need.
     pub left_out: Vec<LeftOut>,
+    /// What is legal but looks like a mistake, or did not turn out as it was asked for, one sentence each.
+    pub warnings: Vec<String>,
     /// How the unseen side was completed.
     pub symmetry: Completion,
     /// The light of the unseen side, where it was estimated.

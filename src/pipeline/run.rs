@@ -5,7 +5,7 @@ use super::options::{Calibrate, Options, PriorChoice};
 use super::pixels::{self, BETTER};
 use super::report::{Clock, LeftOut, Report, peak_rss_bytes};
 use super::spread::spread;
-use super::{baseline, budget, cost, plan};
+use super::{baseline, budget, cost, measured, plan};
 use crate::calibrate::{self, Calibrated, Moved};
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
@@ -78,6 +78,8 @@ pub fn reconstruct_on<'a>(
 
     context.report("plan", 0.0)?;
     let mut left_out = Vec::new();
+    let mut warnings = Vec::new();
+    let asked = options.prior;
     let (options, budget) = budget::resolved(scene, options, &context, || clock.elapsed(), &mut left_out);
     let options = &options;
     context.follow(cost::course(&budget::load(scene), options, context.threads()));
@@ -108,12 +110,27 @@ pub fn reconstruct_on<'a>(
         Some(moved) => cloud.in_frame(&moved.vehicle_from_corrected),
         None => cloud.clone(),
     });
-    let source = plan::prior(options.prior, views.iter().all(|v| v.depth.is_some()));
+    let with_depth = seen.iter().filter(|v| v.depth.is_some()).count();
+    let source = plan::prior(options.prior, with_depth == seen.len());
+    let cloud = match asked {
+        PriorChoice::Auto if (1..seen.len()).contains(&with_depth) => {
+            warnings.push(format!(
+                "depth: {} of {} views have none: the depth of the others counts as measured points, to which the \
+                 prior {} bends; prior given needs it for every view",
+                seen.len() - with_depth,
+                seen.len(),
+                source.name()
+            ));
+            measured::points(&seen, cloud)?
+        }
+        _ => cloud,
+    };
+    let points_given = cloud.as_ref().map(|cloud| cloud.points().len());
     let prior = chosen_prior(source, cloud, options)?;
     let mut geometry = prior.estimate(&views, &context)?;
     geometry.find_normals(&views, &context);
-    if let Some(cloud) = &scene.cloud {
-        plan::note_cloud(&mut left_out, cloud, geometry.points);
+    if let Some(count) = points_given {
+        plan::note_cloud(&mut left_out, count, geometry.points);
     }
     clock.lap("prior");
 
@@ -163,6 +180,7 @@ pub fn reconstruct_on<'a>(
     clock.lap("check");
 
     let (stages, total_ms) = clock.finish();
+    warnings.extend(budget.as_ref().and_then(|plan| plan.overrun(&stages)));
     let report = Report {
         version: env!("CARGO_PKG_VERSION"),
         prior: prior.name(),
@@ -183,6 +201,7 @@ pub fn reconstruct_on<'a>(
         network: geometry.network,
         plan: budget,
         left_out,
+        warnings,
         symmetry: completion,
         relight,
         refinement,

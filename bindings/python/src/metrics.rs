@@ -11,7 +11,7 @@ use crate::whole;
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 use vg::View;
-use vg::metrics::{Lpips, SurfaceErrors, SurfaceOptions, ViewErrors, psnr, ssim};
+use vg::metrics::{Lpips, SurfaceErrors, SurfaceOptions, ViewErrors, check_colors, psnr, ssim};
 use vg::render::{CpuRenderer, RenderOptions, Renderer};
 
 /// PSNR, SSIM, LPIPS.
@@ -124,9 +124,6 @@ fn on_white(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<(Vec<[f32; 3]
         let array = self::floats(object, argument, ALLOWED)?;
         (floats, shape) = (values(&array)?.to_vec(), array.shape().to_vec());
     }
-    if let Some(bad) = floats.iter().find(|v| !v.is_finite()) {
-        return Err(bad_value(object.py(), argument, &bad.to_string(), "finite"));
-    }
     const SIDES: std::ops::RangeInclusive<usize> = 1..=vg::geometry::camera::MAX_SIDE as usize;
     let [height, width, channels @ (3 | 4)] = shape[..] else {
         let allowed = "(height, width, 3 or 4)";
@@ -136,6 +133,7 @@ fn on_white(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<(Vec<[f32; 3]
         let allowed = format!("sides of 1 to {}", SIDES.end());
         return Err(bad_value(object.py(), argument, &shape_text(&shape), &allowed));
     }
+    check_colors(argument, &floats, width, channels).map_err(|e| from_library(object.py(), e))?;
     let pixel = |p: &[f32]| {
         let alpha = p.get(3).map_or(1.0, |a| a.clamp(0.0, 1.0));
         [p[0], p[1], p[2]].map(|c| alpha * c + (1.0 - alpha))

@@ -9,9 +9,9 @@ use crate::renderer::chosen;
 use crate::watched::Teller;
 use crate::whole;
 use numpy::{PyArray2, PyUntypedArray, PyUntypedArrayMethods};
-use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
-use pyo3::types::PyString;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyFunction;
 use vg::pipeline::{Calibrate, Keep, Options, PriorChoice};
 use vg::progress::Progress;
 use vg::refine::{Amount, RefineOptions};
@@ -281,11 +281,8 @@ fn same_size(py: Python<'_>, argument: &str, shape: &[usize], camera: &vg::Camer
 
 /// Something that is legal but looks like a mistake.
 pub(crate) fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
-    let text = PyString::new(py, text);
-    // The line that called vehicle_gaussians.reconstruct or open_scene.
-    const CALLER: i32 = 2;
-    let warnings = py.import("warnings")?;
-    warnings.call_method1("warn", (text, py.get_type::<PyUserWarning>(), CALLER))?;
+    static WARN: PyOnceLock<Py<PyFunction>> = PyOnceLock::new();
+    WARN.import(py, "vehicle_gaussians._warn", "warn")?.call1((text,))?;
     Ok(())
 }
 

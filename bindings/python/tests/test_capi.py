@@ -286,7 +286,7 @@ def test_progress_cancels_logs_and_passes_exceptions_through(ellipsoid: Views) -
 
     def cancel(stage: str, fraction: float) -> bool:
         stages.append(stage)
-        return stage == "head"
+        return stage != "head"
 
     with pytest.raises(vg.VgError, match="cancelled during head") as caught:
         capi.reconstruct(*views, progress=cancel, log=lambda level, line: lines.append((level, line)))

@@ -46,6 +46,7 @@ from ._native import (
 )
 from ._reconstruct import Points, Reconstruction, reconstruct
 from ._scene import Scene, open_scene
+from ._warn import VgWarning
 
 __all__ = [
     "Alignment",
@@ -73,6 +74,7 @@ __all__ = [
     "Status",
     "SurfaceErrors",
     "VgError",
+    "VgWarning",
     "ViewErrors",
     "__version__",
     "align_box",

@@ -1,4 +1,4 @@
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Literal, SupportsIndex, final, overload
@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._gradients import Gradients, Planes
+from ._progress import Progress
 from ._types import Backend, Background, DepthMode, Floats, Heading, Size
 
 __all__ = [
@@ -113,6 +114,7 @@ class Renderer:
         near: float = 0.01,
         far: float = 1e10,
         sh_degree: int = 3,
+        progress: Progress | None = None,
     ) -> list[npt.NDArray[np.uint8]]: ...
 
 @final
@@ -321,6 +323,7 @@ def align_scan(
     heading: Heading,
     names: Sequence[str] | None,
     threads: int,
+    progress: Progress | None,
 ) -> tuple[npt.NDArray[np.float64], float, float, float, float | None, float | None, int]: ...
 def align_box(
     masks: Sequence[npt.NDArray[np.generic] | None],
@@ -330,6 +333,7 @@ def align_box(
     heading: Heading,
     names: Sequence[str] | None,
     threads: int,
+    progress: Progress | None,
 ) -> tuple[npt.NDArray[np.float64], float, float, float, float | None, float | None, int]: ...
 def align_points(
     world: npt.ArrayLike, vehicle: npt.ArrayLike
@@ -345,7 +349,11 @@ def align_points(
     npt.NDArray[np.float64],
 ]: ...
 def align_folder(
-    path: str | PathLike[str], scan: str | PathLike[str] | None, heading: Heading, threads: int
+    path: str | PathLike[str],
+    scan: str | PathLike[str] | None,
+    heading: Heading,
+    threads: int,
+    progress: Progress | None,
 ) -> tuple[npt.NDArray[np.float64], float, float, float, float | None, float | None, int]: ...
 def picture_errors(
     a: npt.NDArray[np.generic],
@@ -402,7 +410,7 @@ def reconstruct(
     refine_backend: str,
     threads: int,
     names: Sequence[str] | None,
-    progress: Callable[[str, float], object] | None,
+    progress: Progress | None,
 ) -> tuple[Gaussians, str, tuple[npt.NDArray[np.float32], npt.NDArray[np.uint8]] | None]: ...
 def open_scene(
     path: str | PathLike[str],
@@ -410,6 +418,7 @@ def open_scene(
     vehicle_from_world: npt.ArrayLike | str | PathLike[str] | None,
     depth_scale: float | None,
     load_depth: bool,
+    progress: Progress | None,
 ) -> tuple[
     list[npt.NDArray[np.uint8]],
     list[npt.NDArray[np.bool_] | None],

@@ -24,7 +24,6 @@ import re
 import signal
 import sys
 import threading
-import warnings
 import weakref
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -41,6 +40,9 @@ from ._errors import ArgumentTypeError, Status, VgError
 from ._frozen import FrozenArray
 from ._gradients import Gradients, Planes
 from ._measures import PictureErrors, SurfaceErrors, ViewErrors
+from ._pictures import in_range
+from ._progress import Progress, teller
+from ._warn import reconstructed, warn
 
 #: The binary interface that this module is written for.
 ABI_VERSION = 0
@@ -236,6 +238,7 @@ class vg_options(ct.Structure):
         ("refine_hold_out", ct.c_int32),
         ("refine_backend", ct.c_int32),
         ("refine_flags", ct.c_uint32),
+        ("progress_overall", ct.POINTER(ct.c_double)),
     )
 
 
@@ -301,6 +304,8 @@ class vg_render_options(ct.Structure):
         ("far_plane", ct.c_float),
         ("max_alpha", ct.c_float),
         ("flags", ct.c_uint32),
+        ("progress", ProgressFn),
+        ("progress_user", ct.c_void_p),
     )
 
 
@@ -374,6 +379,8 @@ class vg_metrics_options(ct.Structure):
         ("lpips", ct.c_void_p),
         ("f_score_m", ct.c_double),
         ("flags", ct.c_uint64),
+        ("progress", ProgressFn),
+        ("progress_user", ct.c_void_p),
     )
 
 
@@ -395,6 +402,8 @@ class vg_align_options(ct.Structure):
         ("context", ct.c_void_p),
         ("heading", ct.c_int32),
         ("flags", ct.c_uint32),
+        ("progress", ProgressFn),
+        ("progress_user", ct.c_void_p),
     )
 
 
@@ -423,6 +432,8 @@ class vg_scene_options(ct.Structure):
         ("flags", ct.c_uint32),
         ("log", LogFn),
         ("log_user", ct.c_void_p),
+        ("progress", ProgressFn),
+        ("progress_user", ct.c_void_p),
     )
 
 
@@ -987,7 +998,8 @@ class Gaussians:
         depth = np.empty(size, np.float32) if with_depth else None
         target.width, target.height = posed.width, posed.height
         target.color, target.depth = picture.ctypes.data, _address(depth)
-        _call("vg_render", self._handle, ct.byref(posed), ct.byref(options), ct.byref(target))
+        with _told(options, None):
+            _call("vg_render", self._handle, ct.byref(posed), ct.byref(options), ct.byref(target))
         return (picture[..., :3] if opaque else picture), depth
 
     def render_planes(
@@ -1009,7 +1021,8 @@ class Gaussians:
         picture, alpha, depth = np.empty((*size, 4), np.float32), np.empty(size, np.float32), np.empty(size, np.float32)
         target.width, target.height, target.color_format = posed.width, posed.height, Format.RGBA32F
         target.color, target.alpha, target.depth = picture.ctypes.data, alpha.ctypes.data, depth.ctypes.data
-        _call("vg_render", self._handle, ct.byref(posed), ct.byref(options), ct.byref(target))
+        with _told(options, None):
+            _call("vg_render", self._handle, ct.byref(posed), ct.byref(options), ct.byref(target))
         return Planes(np.ascontiguousarray(picture[..., :3]), alpha, depth)
 
     def render_backward(
@@ -1059,7 +1072,8 @@ class Gaussians:
             setattr(out, field, values.ctypes.data)
         out.count, out.sh_degree = n, self.sh_degree
         arguments = (ct.byref(posed), ct.byref(options), None, ct.byref(gradient), ct.byref(out))
-        _call("vg_render_backward", self._handle, *arguments)
+        with _told(options, None):
+            _call("vg_render_backward", self._handle, *arguments)
         return made
 
     def _array(self, name: str, *per_gaussian: int) -> npt.NDArray[np.float32]:
@@ -1158,6 +1172,7 @@ class Renderer(_Handle):
         background: str | Sequence[float] = "white",
         *,
         antialiased: bool = False,
+        progress: Progress | None = None,
         context: Context | None = None,
     ) -> npt.NDArray[np.uint8]:
         """Pictures of cameras of one size: uint8 (n, height, width, 3), or 4 with straight alpha on a "transparent"
@@ -1174,7 +1189,8 @@ class Renderer(_Handle):
             target.width, target.height = camera.width, camera.height
             target.color, target.color_format = picture.ctypes.data, format
         array = (vg_camera * len(posed))(*posed)
-        _call("vg_renderer_render", self, array, len(posed), ct.byref(options), targets)
+        with _told(options, progress):
+            _call("vg_renderer_render", self, array, len(posed), ct.byref(options), targets)
         return pictures
 
 
@@ -1245,7 +1261,7 @@ def reconstruct(
     refine_hold_out: bool = False,
     refine_backend: Literal["auto", "cpu", "gpu"] = "auto",
     names: Iterable[str] | None = None,
-    progress: Callable[[str, float], object] | None = None,
+    progress: Progress | None = None,
     log: Callable[[LogLevel, str], object] | None = None,
     context: Context | None = None,
 ) -> Reconstruction:
@@ -1309,36 +1325,51 @@ def reconstruct(
     options.check, options.points = check, points
     if vehicle_size is not None:
         options.vehicle_size[:] = doubles(vehicle_size, "vehicle_size", (3,)).tolist()
+    car, report = ct.c_void_p(), ct.c_void_p()
+    with _told(options, progress) as raised:
+        options.log = LogFn(_logger(log, raised)) if log is not None else LogFn()
+        _call("vg_reconstruct", views, n, ct.byref(options), ct.byref(car), ct.byref(report))
+        gaussians, made = Gaussians(_Handle("gaussians", car)), _Handle("report", report)
+    lifted = None
+    if points:
+        count = int(library.vg_report_point_count(made))
+        lifted = Points(
+            made.array(library.vg_report_point_positions(made), (count, 3), np.float32),
+            made.array(library.vg_report_point_colors(made), (count, 3), np.uint8),
+        )
+    told = json.loads(library.vg_report_json(made))
+    reconstructed(told)
+    return Reconstruction(gaussians, told, lifted)
+
+
+@contextlib.contextmanager
+def _told(options: Any, progress: Progress | None) -> Iterator[list[BaseException]]:
+    """Has a call with these options tell ``progress`` how far it is, and end at Ctrl-C. Hands out the list of what was
+    raised in callbacks, of which the first is raised at the end."""
     raised: list[BaseException] = []
+    tell, overall = None if progress is None else teller(progress), ct.c_double()
 
     def on_progress(stage: bytes, fraction: float, _: object) -> int:
         try:
-            return int(bool(raised) or (progress is not None and bool(progress(stage.decode(), fraction))))
+            told = overall.value if has_stages else fraction
+            return int(bool(raised) or not (tell is None or tell(stage.decode(), fraction, told)))
         except BaseException as error:
             raised.append(error)
             return 1
 
+    has_stages = isinstance(options, vg_options)
+    if has_stages:
+        options.progress_overall = ct.pointer(overall)
     # Always there: between two calls of it Python cannot see Ctrl-C.
     options.progress = ProgressFn(on_progress)
-    options.log = LogFn(_logger(log, raised)) if log is not None else LogFn()
-    car, report = ct.c_void_p(), ct.c_void_p()
     try:
         with _signals_kept(raised):
-            _call("vg_reconstruct", views, n, ct.byref(options), ct.byref(car), ct.byref(report))
+            yield raised
     except VgError:
         if not raised:
             raise
-    gaussians, told = Gaussians(_Handle("gaussians", car)), _Handle("report", report)
     if raised:
         raise raised[0]
-    lifted = None
-    if points:
-        count = int(library.vg_report_point_count(told))
-        lifted = Points(
-            told.array(library.vg_report_point_positions(told), (count, 3), np.float32),
-            told.array(library.vg_report_point_colors(told), (count, 3), np.uint8),
-        )
-    return Reconstruction(gaussians, json.loads(library.vg_report_json(told)), lifted)
 
 
 @contextlib.contextmanager
@@ -1501,13 +1532,18 @@ def _picture(array: npt.NDArray[Any], argument: str, alive: list[Any]) -> vg_ima
 
 
 def picture_errors(
-    a: npt.NDArray[Any], b: npt.NDArray[Any], *, lpips: Model | None = None, context: Context | None = None
+    a: npt.NDArray[Any],
+    b: npt.NDArray[Any],
+    *,
+    data_range: float | None = None,
+    lpips: Model | None = None,
+    context: Context | None = None,
 ) -> PictureErrors:
-    """The difference of two pictures of one size, uint8 or float32 in [0, 1], (height, width, 3 or 4).
-
-    What their alpha leaves open is white.
+    """The difference of two pictures of one size, uint8 or floats in [0, 1], (height, width, 3 or 4); the arguments are
+    those of vehicle_gaussians.picture_errors.
     """
     alive: list[Any] = []
+    a, b = in_range(a, data_range), in_range(b, data_range)
     pictures = _picture(a, "a", alive), _picture(b, "b", alive)
     options, errors = _metrics_options(lpips, 0.05, context), _initial(vg_picture_errors)
     _call("vg_metrics_pictures", *map(ct.byref, pictures), ct.byref(options), ct.byref(errors))
@@ -1533,7 +1569,8 @@ def view_errors(
     if depth is not None:
         view.depth = _depth(depth, "depth", alive)
     options, errors = _metrics_options(lpips, 0.05, context), _initial(vg_view_errors)
-    _call("vg_metrics_view", _lent_gaussians(gaussians), ct.byref(view), ct.byref(options), ct.byref(errors))
+    with _told(options, None):
+        _call("vg_metrics_view", _lent_gaussians(gaussians), ct.byref(view), ct.byref(options), ct.byref(errors))
     return ViewErrors(*_measures(errors))  # type: ignore[arg-type]
 
 
@@ -1547,7 +1584,8 @@ def surface_errors(
     scan = _measured(points, "points")
     options, errors = _metrics_options(None, f_score, context), _initial(vg_surface_errors)
     lists = (_lent_gaussians(gaussians), scan.ctypes.data, len(scan))
-    _call("vg_metrics_surface", *lists, ct.byref(options), ct.byref(errors))
+    with _told(options, None):
+        _call("vg_metrics_surface", *lists, ct.byref(options), ct.byref(errors))
     return SurfaceErrors(*_measures(errors))  # type: ignore[arg-type]
 
 
@@ -1598,6 +1636,7 @@ def align_scan(
     *,
     heading: str = "auto",
     names: Sequence[str] | None = None,
+    progress: Progress | None = None,
     context: Context | None = None,
 ) -> Alignment:
     """The vehicle's frame by points scanned on the vehicle; the arguments are those of vehicle_gaussians.align_scan."""
@@ -1605,7 +1644,9 @@ def align_scan(
     views, found = _masked_views(masks, cameras, names, alive), _initial(vg_alignment)
     world, scanned = _points(sparse, "sparse"), _measured(scan, "scan")
     lists = (views, len(views), world.ctypes.data, len(world), scanned.ctypes.data, len(scanned))
-    _call("vg_align_scan", *lists, ct.byref(_align_options(heading, context)), ct.byref(found))
+    options = _align_options(heading, context)
+    with _told(options, progress):
+        _call("vg_align_scan", *lists, ct.byref(options), ct.byref(found))
     return _alignment(found)
 
 
@@ -1617,6 +1658,7 @@ def align_box(
     *,
     heading: str,
     names: Sequence[str] | None = None,
+    progress: Progress | None = None,
     context: Context | None = None,
 ) -> Alignment:
     """The vehicle's frame by its size and the ground; the arguments are those of vehicle_gaussians.align_box."""
@@ -1624,7 +1666,9 @@ def align_box(
     views, found = _masked_views(masks, cameras, names, alive), _initial(vg_alignment)
     world, sides = _points(sparse, "sparse"), doubles(size, "size", (3,))
     lists = (views, len(views), world.ctypes.data, len(world), sides.ctypes.data)
-    _call("vg_align_box", *lists, ct.byref(_align_options(heading, context)), ct.byref(found))
+    options = _align_options(heading, context)
+    with _told(options, progress):
+        _call("vg_align_box", *lists, ct.byref(options), ct.byref(found))
     return _alignment(found)
 
 
@@ -1645,12 +1689,14 @@ def align_folder(
     scan: str | os.PathLike[str] | None = None,
     *,
     heading: str = "auto",
+    progress: Progress | None = None,
     context: Context | None = None,
 ) -> Alignment:
     """align_scan with the files of a scene; the arguments are those of vehicle_gaussians.align_folder."""
     found, file = _initial(vg_alignment), None if scan is None else os.fsencode(scan)
     options = _align_options(heading, context)
-    _call("vg_align_folder", os.fsencode(path), file, ct.byref(options), ct.byref(found))
+    with _told(options, progress):
+        _call("vg_align_folder", os.fsencode(path), file, ct.byref(options), ct.byref(found))
     return _alignment(found)
 
 
@@ -1677,6 +1723,7 @@ def open_scene(
     *,
     depth_scale: float | None = None,
     load_depth: bool = True,
+    progress: Progress | None = None,
     context: Context | None = None,
 ) -> Scene:
     """Opens a transforms.json, a folder with one, or a COLMAP folder; the arguments are those of
@@ -1692,16 +1739,16 @@ def open_scene(
         options.names, options.name_count = names, len(wanted)
     options.depth_scale, options.load_depth = real(depth_scale or 0.0, "depth_scale"), load_depth
     notes: list[str] = []
-    raised: list[BaseException] = []
-    options.log = LogFn(_logger(lambda _, note: notes.append(note), raised))
     path = Path(path)
     has_transforms = path.is_file() or (path / "transforms.json").is_file()
     made = ct.c_void_p()
     name = "vg_transforms_open" if has_transforms else "vg_colmap_open"
-    _call(name, os.fsencode(path), ct.byref(options), ct.byref(made))
-    handle = _Handle("scene", made)
+    with _told(options, progress) as raised:
+        options.log = LogFn(_logger(lambda _, note: notes.append(note), raised))
+        _call(name, os.fsencode(path), ct.byref(options), ct.byref(made))
+        handle = _Handle("scene", made)
     for note in notes:
-        warnings.warn(note, stacklevel=2)
+        warn(note)
 
     scene = Scene([], [], [], [], [])
     for i in range(library.vg_scene_view_count(handle)):
