@@ -4,11 +4,14 @@ mod common;
 
 use common::vehicle::{HALF, right_side, without_depth};
 use std::ops::ControlFlow;
+use vg::metrics::ViewErrors;
 use vg::pipeline::{Calibrate, Options, PriorChoice, Reconstruction, reconstruct};
-use vg::refine::{Amount, Densify, Rates, RefineOptions, Stop};
+use vg::progress::Threads;
+use vg::refine::{self, Amount, Densify, Rates, RefineOptions, Stop};
 use vg::relight::Relight;
+use vg::render::{CpuRenderer, RenderOptions, Renderer};
 use vg::symmetry::SymmetryMode;
-use vg::{Error, Scene};
+use vg::{Error, Gaussians, Scene};
 
 fn options(refine: RefineOptions) -> Options {
     Options {
@@ -182,6 +185,25 @@ fn mirrored_photographs_refine_both_sides() {
     let done = run(&scene, &flip).report.refinement.unwrap();
     assert_eq!(done.exposures.len(), 8);
     assert!(done.psnr_db[1] > done.psnr_db[0], "{:?}", done.psnr_db);
+}
+
+#[test]
+fn a_model_from_anywhere_is_refined_on_threads_that_are_there_and_is_nearer_to_every_view() {
+    let scene = right_side(64, 48);
+    let given = run(&scene, &Options { refine: None, ..options(steps(0)) }).gaussians;
+    let threads = Threads::new(2).unwrap();
+    let (refined, done) =
+        refine::model_on(&threads, &given, &scene, &steps(40), &mut |_| ControlFlow::Continue(())).unwrap();
+    let (own, _) = refine::model(&given, &scene, &steps(40), 3, &mut |_| ControlFlow::Continue(())).unwrap();
+    assert!(refined == own && done.made == 40);
+    let errors = |model: &Gaussians| ViewErrors::of_scene(model, &scene, &threads).unwrap();
+    let (before, after) = (errors(&given), errors(&refined));
+    assert_eq!((before.len(), after.len()), (scene.views.len(), scene.views.len()));
+    assert!(before.iter().zip(&after).all(|(b, a)| a.psnr_db > b.psnr_db), "{before:?} {after:?}");
+    let view = &scene.views[2];
+    let drawn = CpuRenderer::new().render(&refined, &view.camera, &RenderOptions::default()).unwrap();
+    assert_eq!(after[2], ViewErrors::of(&drawn, view));
+    assert!(ViewErrors::of_scene(&refined, &Scene::default(), &threads).is_err());
 }
 
 #[test]

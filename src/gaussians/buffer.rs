@@ -253,6 +253,19 @@ impl Gaussians {
         }
     }
 
+    /// Those at these indices, which are below the length, in this order.
+    pub(super) fn gathered(&self, indices: &[usize]) -> Self {
+        let stride = self.sh_stride();
+        Self {
+            sh_degree: self.sh_degree,
+            means: indices.iter().map(|&i| self.means[i]).collect(),
+            rotations: indices.iter().map(|&i| self.rotations[i]).collect(),
+            scales: indices.iter().map(|&i| self.scales[i]).collect(),
+            opacities: indices.iter().map(|&i| self.opacities[i]).collect(),
+            sh: indices.iter().flat_map(|&i| &self.sh[i * stride..(i + 1) * stride]).copied().collect(),
+        }
+    }
+
     /// The arrays that a move changes.
     pub(super) fn moved_arrays_mut(&mut self) -> MovedArrays<'_> {
         MovedArrays {

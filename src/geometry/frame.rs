@@ -1,7 +1,7 @@
 //! Conversions at the edge of the program: other software's poses into `vehicle_from_camera`, nowhere else.
 
 use super::pose::Pose;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use glam::{DMat3, DVec3};
 
 /// Camera axes of OpenGL, Blender and nerfstudio (x right, y up, z backward) to ours (x right, y down, z forward).
@@ -26,6 +26,21 @@ pub fn pose_from_colmap(argument: &str, qvec_wxyz: [f64; 4], tvec: [f64; 3]) -> 
     Ok(Pose::from_wxyz(argument, qvec_wxyz, DVec3::from_array(tvec))?.inverse())
 }
 
+/// OpenCV's world-to-camera `rvec`, a rotation vector whose length is the angle in radians, and `tvec`, as
+/// `world_from_camera`: what `cv::solvePnP`, `cv::calibrateCamera` and ArUco return.
+pub fn pose_from_opencv(argument: &str, rvec: [f64; 3], tvec: [f64; 3]) -> Result<Pose> {
+    let (rvec, translation) = (DVec3::from_array(rvec), DVec3::from_array(tvec));
+    let angle = rvec.length();
+    if !angle.is_finite() || !translation.is_finite() {
+        let found = format!("rvec {rvec}, tvec {translation}");
+        return Err(Error::argument(argument, found, "finite numbers"));
+    }
+    // The axis of no rotation is any; where the length underflows there is none to tell.
+    let axis = if angle > 0.0 { rvec / angle } else { DVec3::Z };
+    let rotation = DMat3::from_axis_angle(axis.normalize(), angle);
+    Ok(Pose { rotation, translation }.inverse())
+}
+
 /// `vehicle_from_camera` of a vehicle that was tracked as a box: where the box and the camera stood in one frame (ego,
 /// map, UTM) at the moment of the picture. The box's axes must be the vehicle's: x forward, y left, z up.
 ///
@@ -47,6 +62,25 @@ mod tests {
     fn pose(yaw: f64, pitch: f64, roll: f64, translation: DVec3) -> Pose {
         let rotation = DMat3::from_euler(glam::EulerRot::ZYX, yaw, pitch, roll);
         Pose::new("pose", rotation, translation).unwrap()
+    }
+
+    #[test]
+    fn opencv_s_rotation_vectors_turn_as_rodrigues_says() {
+        let camera_from_world = |rvec| pose_from_opencv("pose", rvec, [1.0, 2.0, 3.0]).unwrap().inverse();
+        // A quarter turn about z takes x to y.
+        let quarter = camera_from_world([0.0, 0.0, std::f64::consts::FRAC_PI_2]);
+        assert!((quarter.transform_point(DVec3::X) - DVec3::new(1.0, 3.0, 3.0)).length() < 1e-15);
+        let (rvec, p) = (DVec3::new(0.3, -1.1, 0.7), DVec3::new(0.2, 0.5, -0.4));
+        let (angle, axis) = (rvec.length(), rvec.normalize());
+        let turned = p * angle.cos() + axis.cross(p) * angle.sin() + axis * axis.dot(p) * (1.0 - angle.cos());
+        let found = camera_from_world(rvec.to_array()).transform_point(p);
+        assert!((found - turned - DVec3::new(1.0, 2.0, 3.0)).length() < 1e-14);
+        assert_eq!(camera_from_world([0.0; 3]).rotation, DMat3::IDENTITY);
+        assert_eq!(camera_from_world([1e-320, 0.0, 0.0]).rotation, DMat3::IDENTITY);
+        for bad in [[f64::NAN, 0.0, 0.0], [f64::INFINITY, 0.0, 0.0], [1e300, 0.0, 0.0]] {
+            assert!(pose_from_opencv("pose", bad, [0.0; 3]).is_err(), "{bad:?}");
+        }
+        assert!(pose_from_opencv("pose", [0.0; 3], [f64::NAN; 3]).is_err());
     }
 
     #[test]

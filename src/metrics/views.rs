@@ -1,8 +1,11 @@
 //! All measures of one render against its photograph, and their means over views.
 
 use super::{on_white, psnr, psnr_in, silhouette_iou, ssim};
-use crate::render::Rendered;
-use crate::scene::View;
+use crate::error::Result;
+use crate::gaussians::Gaussians;
+use crate::progress::Threads;
+use crate::render::{CpuRenderer, RenderOptions, Rendered};
+use crate::scene::{Scene, View};
 use serde::Serialize;
 
 /// Error of one render on white, or the means over several; `None` where a measure does not exist.
@@ -41,6 +44,21 @@ impl ViewErrors {
             depth_mae_m: mean(depth.iter().copied()),
             depth_p90_m: percentile_90(depth),
         }
+    }
+
+    /// Errors of a model in every view of a scene, in their order, drawn by the CPU on white.
+    ///
+    /// # Errors
+    /// A scene that is not valid.
+    pub fn of_scene(gaussians: &Gaussians, scene: &Scene, threads: &Threads) -> Result<Vec<Self>> {
+        scene.validate()?;
+        let renderer = CpuRenderer::new();
+        let mut drawn = Rendered::default();
+        let mut of = |view: &View| {
+            renderer.render_into(gaussians, &view.camera, &RenderOptions::default(), &mut drawn)?;
+            Ok(Self::of(&drawn, view))
+        };
+        threads.run(|| scene.views.iter().map(&mut of).collect())
     }
 
     /// Means over views, each measure over those that have it; `None` of nothing.

@@ -4,21 +4,14 @@ use crate::args::RenderArgs;
 use crate::job::{self, Failure, Outcome, Result};
 use crate::shown::Bar;
 use crate::{files, scene};
-use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use vg::geometry::Intrinsics;
+use vg::geometry::Turntable;
 use vg::io::{self, NamedCamera, image, ply};
 use vg::progress::Threads;
 use vg::render::{AssetRenderer, Background, RenderOptions, Rendered, Rgba8};
-use vg::{Camera, Gaussians, Pose};
-
-/// The turntable's camera looks down on the vehicle by this much, radians (12 degrees).
-const ELEVATION: f64 = 0.21;
-
-/// Its vertical field of view, radians (35 degrees): that of a lens for portraits.
-const FIELD_OF_VIEW: f64 = 0.61;
+use vg::{Camera, Gaussians};
 
 /// Reads the model, draws it into every camera.
 pub(crate) fn run(args: &RenderArgs) -> Result {
@@ -110,7 +103,7 @@ pub(crate) fn picture_name(name: &str) -> String {
     format!("{}.png", stem.to_string_lossy())
 }
 
-/// `n` cameras on a circle around the middle of the model, all of it in their pictures, the first in front.
+/// `n` cameras on a circle around the middle of the model, named by their numbers.
 pub(crate) fn turntable(
     gaussians: &Gaussians,
     n: u32,
@@ -118,31 +111,8 @@ pub(crate) fn turntable(
 ) -> Result<Vec<NamedCamera>> {
     let (low, high) =
         gaussians.bounds().ok_or_else(|| Failure::job("the model has no Gaussians to walk around"))?;
-    let (low, high) = (low.map(f64::from), high.map(f64::from));
-    let center = 0.5 * (DVec3::from(low) + DVec3::from(high));
-    let half = 0.5 * (DVec3::from(high) - DVec3::from(low));
-    // The cylinder around the model fits between the picture's borders from every side.
-    let radius = half.x.hypot(half.y).max(1e-3);
-    let focal = 0.5 * f64::from(height) / (0.5 * FIELD_OF_VIEW).tan();
-    let tangent = |side: u32| 0.5 * f64::from(side) / focal;
-    let for_width = radius / tangent(width).atan().sin();
-    let for_height = (half.z * ELEVATION.cos() + radius * ELEVATION.sin()) / tangent(height) + radius;
-    let distance = for_width.max(for_height);
-    let intrinsics =
-        Intrinsics { fx: focal, fy: focal, cx: 0.5 * f64::from(width), cy: 0.5 * f64::from(height) };
+    let cameras = Turntable::default().cameras(low, high, n as usize, width, height)?;
     let digits = (n - 1).to_string().len().max(3);
-    (0..n)
-        .map(|i| {
-            let azimuth = std::f64::consts::TAU * f64::from(i) / f64::from(n);
-            let outwards =
-                DVec3::new(azimuth.cos() * ELEVATION.cos(), azimuth.sin() * ELEVATION.cos(), ELEVATION.sin());
-            let right = outwards.cross(DVec3::Z).normalize() * -1.0;
-            let forward = -outwards;
-            let down = forward.cross(right);
-            let pose =
-                Pose::new("turntable", DMat3::from_cols(right, down, forward), center + distance * outwards)?;
-            let camera = Camera::pinhole(width, height, intrinsics, pose)?;
-            Ok(NamedCamera { name: format!("{i:0digits$}.png"), camera })
-        })
-        .collect()
+    let named = |(i, camera)| NamedCamera { name: format!("{i:0digits$}.png"), camera };
+    Ok(cameras.into_iter().enumerate().map(named).collect())
 }

@@ -158,17 +158,8 @@ pub fn write(path: &Path, gaussians: &Gaussians) -> Result<()> {
 /// Writes the Gaussians as a PLY file, a row at a time.
 pub fn write_to(out: &mut dyn Write, gaussians: &Gaussians) -> std::io::Result<()> {
     let coefficients = sh::coefficients(gaussians.sh_degree());
-    let mut names: Vec<String> = ["x", "y", "z", "nx", "ny", "nz"].map(String::from).into();
-    names.extend((0..3).map(|i| format!("f_dc_{i}")));
-    names.extend((0..3 * (coefficients - 1)).map(|i| format!("f_rest_{i}")));
-    names.push("opacity".into());
-    names.extend((0..3).map(|i| format!("scale_{i}")));
-    names.extend((0..4).map(|i| format!("rot_{i}")));
-    write!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}\n", gaussians.len())?;
-    for name in &names {
-        writeln!(out, "property float {name}")?;
-    }
-    writeln!(out, "end_header")?;
+    let names = property_names(coefficients);
+    out.write_all(header_of(gaussians, &names).as_bytes())?;
 
     let mut row: Vec<f32> = Vec::with_capacity(names.len());
     let mut bytes = Vec::with_capacity(names.len() * 4);
@@ -190,6 +181,29 @@ pub fn write_to(out: &mut dyn Write, gaussians: &Gaussians) -> std::io::Result<(
         out.write_all(&bytes)?;
     }
     Ok(())
+}
+
+/// How long the file of these Gaussians is, bytes.
+pub fn size_of(gaussians: &Gaussians) -> usize {
+    let names = property_names(sh::coefficients(gaussians.sh_degree()));
+    header_of(gaussians, &names).len() + gaussians.len() * names.len() * 4
+}
+
+/// Properties of a vertex in the order of 3DGS; `coefficients` of each channel's colour.
+fn property_names(coefficients: usize) -> Vec<String> {
+    let mut names: Vec<String> = ["x", "y", "z", "nx", "ny", "nz"].map(String::from).into();
+    names.extend((0..3).map(|i| format!("f_dc_{i}")));
+    names.extend((0..3 * (coefficients - 1)).map(|i| format!("f_rest_{i}")));
+    names.push("opacity".into());
+    names.extend((0..3).map(|i| format!("scale_{i}")));
+    names.extend((0..4).map(|i| format!("rot_{i}")));
+    names
+}
+
+fn header_of(gaussians: &Gaussians, names: &[String]) -> String {
+    let properties: String = names.iter().map(|name| format!("property float {name}\n")).collect();
+    let count = gaussians.len();
+    format!("ply\nformat binary_little_endian 1.0\nelement vertex {count}\n{properties}end_header\n")
 }
 
 /// Inverse of the logistic function; exactly 0 and 1 get finite logits that come back as exactly 0 and 1.

@@ -1,0 +1,92 @@
+//! Points of the vehicle's frame to pixels and back, through the camera's lens.
+
+use super::camera::Camera;
+use glam::DVec3;
+
+/// Largest difference, relative to the radius from the axis, of a ray and what the lens makes of its pixel. Beyond a
+/// fold of the model the two are rays apart; short of it they differ by what [`Camera::ray`] is solved to, 1e-9.
+const SAME_RAY: f64 = 1e-6;
+
+impl Camera {
+    /// Column and row of a point, metres, vehicle frame. `None` where the camera has no picture of it: on or behind its
+    /// plane, and beyond the angle at which the lens model folds back, where a pixel would show a ghost.
+    pub fn pixel_from_vehicle(&self, point_vehicle: DVec3) -> Option<[f64; 2]> {
+        self.pixel_and_depth(point_vehicle).map(|(pixel, _)| pixel)
+    }
+
+    /// The same with the point's planar depth, metres along the optical axis.
+    pub fn pixel_and_depth(&self, point_vehicle: DVec3) -> Option<([f64; 2], f64)> {
+        let point = self.vehicle_from_camera.inverse().transform_point(point_vehicle);
+        let pixel = self.project(point).filter(|p| p.iter().all(|v| v.is_finite()))?;
+        (self.distortion.is_none() || self.is_seen_along(point, pixel)).then_some((pixel, point.z))
+    }
+
+    /// Whether the lens leads this pixel back to the point it was projected from.
+    fn is_seen_along(&self, point_camera: DVec3, pixel: [f64; 2]) -> bool {
+        let [x, y] = [point_camera.x / point_camera.z, point_camera.y / point_camera.z];
+        self.ray(pixel).is_some_and(|ray| (ray.x - x).hypot(ray.y - y) <= SAME_RAY * (1.0 + x.hypot(y)))
+    }
+
+    /// The point at planar depth `depth_m` behind a pixel, metres, vehicle frame. `None` where the lens has no ray to the
+    /// pixel, and where the depth is not above 0, which means no measurement, or not finite.
+    pub fn vehicle_from_pixel(&self, pixel: [f64; 2], depth_m: f64) -> Option<DVec3> {
+        if !(depth_m > 0.0) {
+            return None;
+        }
+        let point = self.vehicle_from_camera.transform_point(self.ray(pixel)? * depth_m);
+        point.is_finite().then_some(point)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Distortion, Intrinsics, Pose};
+    use super::*;
+
+    fn camera(distortion: Distortion) -> Camera {
+        let intrinsics = Intrinsics { fx: 500.0, fy: 510.0, cx: 320.25, cy: 239.5 };
+        let pose =
+            Pose::look_at("", DVec3::new(3.0, -4.0, 1.5), DVec3::new(0.1, 0.2, 0.3), DVec3::Z).unwrap();
+        Camera { width: 640, height: 480, intrinsics, distortion, vehicle_from_camera: pose }
+    }
+
+    const BROWN: Distortion = Distortion::Brown { k: [-0.2, 0.05, 0.0, 0.0, 0.0, 0.0], p: [1e-3, -2e-3] };
+    const FISHEYE: Distortion = Distortion::Fisheye { k: [0.02, -0.01, 0.003, 0.0] };
+
+    #[test]
+    fn pixels_with_their_depths_are_the_points_they_were_projected_from() {
+        for distortion in [Distortion::None, BROWN, FISHEYE] {
+            let camera = camera(distortion);
+            for i in 0..100 {
+                let t = f64::from(i);
+                let point = DVec3::new((0.7 * t).sin(), (1.3 * t).cos(), 0.5 * (0.3 * t).sin());
+                let (pixel, depth) = camera.pixel_and_depth(point).unwrap();
+                let back = camera.vehicle_from_pixel(pixel, depth).unwrap();
+                // Rays are solved to 1e-9 at worst, distances are about 6.
+                assert!((back - point).length() < 1e-8, "{distortion:?} {point} {back}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_point_beyond_the_fold_of_the_lens_has_no_pixel() {
+        // r (1 - r^2 / 3) turns back at r = 1: the ray at 1.2 would share a pixel with the one at 0.78.
+        let fold = Distortion::Brown { k: [-1.0 / 3.0, 0.0, 0.0, 0.0, 0.0, 0.0], p: [0.0; 2] };
+        let camera = Camera { vehicle_from_camera: Pose::IDENTITY, ..camera(fold) };
+        let at = |r: f64| camera.pixel_from_vehicle(DVec3::new(r, 0.0, 1.0));
+        assert!(at(0.78).is_some() && at(1.2).is_none());
+        assert!(camera.project(DVec3::new(1.2, 0.0, 1.0)).is_some(), "the lens model alone has one");
+    }
+
+    #[test]
+    fn what_is_behind_or_nowhere_has_no_pixel_and_depths_that_mean_nothing_give_no_point() {
+        let camera = camera(BROWN);
+        for point in [DVec3::new(6.0, -8.0, 2.7), camera.center(), DVec3::NAN, DVec3::INFINITY] {
+            assert_eq!(camera.pixel_from_vehicle(point), None, "{point}");
+        }
+        for depth in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert_eq!(camera.vehicle_from_pixel([10.0, 20.0], depth), None, "{depth}");
+        }
+        assert_eq!(camera.vehicle_from_pixel([f64::NAN, 20.0], 1.0), None);
+    }
+}

@@ -1,0 +1,246 @@
+//! Cameras that are placed by hand: one that looks at a point, and a circle of them around a box.
+
+use super::camera::{Camera, Intrinsics};
+use super::pose::Pose;
+use crate::error::{Error, Result};
+use glam::{DMat3, DVec3};
+
+/// Least sine of the angle between the line of sight and `up`: below it, rounding decides which way is up.
+const LEAST_TILT: f64 = 1e-6;
+
+/// Smallest cylinder that a turntable walks around, metres: a single Gaussian has no extent.
+const LEAST_RADIUS_M: f64 = 1e-3;
+
+/// Most cameras of one turntable.
+const MOST_CAMERAS: usize = 100_000;
+
+impl Pose {
+    /// `vehicle_from_camera` of a camera at `eye` whose optical axis meets `target`. The picture's columns run upwards
+    /// along `up` as far as the line of sight allows; [`DVec3::Z`] for a camera that is held level.
+    ///
+    /// # Errors
+    /// `argument` and one of `eye`, `target`, `up`: a number is not finite, `eye` is `target`, `up` is zero or lies
+    /// along the line of sight.
+    pub fn look_at(argument: &str, eye: DVec3, target: DVec3, up: DVec3) -> Result<Self> {
+        let refuse = |name: &str, found: String, allowed: &str| {
+            Err(Error::argument(format!("{argument}{name}"), found, allowed))
+        };
+        for (name, point) in [("eye", eye), ("target", target), ("up", up)] {
+            if !point.is_finite() {
+                return refuse(name, point.to_string(), "finite numbers");
+            }
+        }
+        let Some(forward) = direction(target - eye) else {
+            return refuse("target", format!("{target}, where the camera stands"), "a point away from eye");
+        };
+        let Some(up_unit) = direction(up) else {
+            return refuse("up", up.to_string(), "a direction that is not zero");
+        };
+        let right = forward.cross(up_unit);
+        if right.length() < LEAST_TILT {
+            return refuse("up", format!("{up}, along the line of sight"), "a direction across it");
+        }
+        let right = right.normalize();
+        let rotation = DMat3::from_cols(right, forward.cross(right), forward);
+        Self::new(argument, rotation, eye)
+    }
+}
+
+/// The unit vector along `v`; `None` for zero and for what overflows.
+fn direction(v: DVec3) -> Option<DVec3> {
+    // By the largest entry first, so that lengths of 1e-200 and 1e200 neither vanish nor overflow.
+    (v / v.abs().max_element()).try_normalize()
+}
+
+impl Intrinsics {
+    /// A pinhole whose picture shows `fov_y_degrees` from its top to its bottom row, with square pixels and the
+    /// principal point in the middle.
+    ///
+    /// # Errors
+    /// `fov_y_degrees` is not between 0 and 180, both excluded.
+    pub fn from_fov(width: u32, height: u32, fov_y_degrees: f64) -> Result<Self> {
+        if !(fov_y_degrees > 0.0 && fov_y_degrees < 180.0) {
+            let allowed = "above 0, below 180 degrees";
+            return Err(Error::argument("fov_y_degrees", fov_y_degrees.to_string(), allowed));
+        }
+        let (half_width, half_height) = (0.5 * f64::from(width), 0.5 * f64::from(height));
+        let focal = half_height / (0.5 * fov_y_degrees.to_radians()).tan();
+        Ok(Self { fx: focal, fy: focal, cx: half_width, cy: half_height })
+    }
+}
+
+impl Camera {
+    /// A pinhole camera at `eye` that looks at `target`, metres, vehicle frame: [`Pose::look_at`] with
+    /// [`Intrinsics::from_fov`]. For another lens give [`Pose::look_at`] to its constructor.
+    ///
+    /// # Errors
+    /// What these two and [`Camera::validate`] refuse.
+    pub fn look_at(
+        eye: DVec3,
+        target: DVec3,
+        up: DVec3,
+        fov_y_degrees: f64,
+        width: u32,
+        height: u32,
+    ) -> Result<Self> {
+        let pose = Pose::look_at("", eye, target, up)?;
+        Self::pinhole(width, height, Intrinsics::from_fov(width, height, fov_y_degrees)?, pose)
+    }
+}
+
+/// How a turntable looks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Turntable {
+    /// Angle by which the cameras look down, -89 to 89 degrees.
+    pub elevation_degrees: f64,
+    /// Vertical field of view, degrees.
+    pub fov_y_degrees: f64,
+}
+
+impl Default for Turntable {
+    /// Slightly from above, through a lens for portraits.
+    fn default() -> Self {
+        Self { elevation_degrees: 12.0, fov_y_degrees: 35.0 }
+    }
+}
+
+impl Turntable {
+    /// `count` cameras on a circle around the box from `low` to `high`, metres, vehicle frame: the first in front, the
+    /// next towards the left, each with all of the box in its picture. [`Gaussians::bounds`](crate::Gaussians::bounds)
+    /// gives the box of a model.
+    ///
+    /// # Errors
+    /// No camera or more than 100,000, a box without order or with a NaN, angles out of range, and what
+    /// [`Camera::validate`] refuses.
+    pub fn cameras(
+        &self,
+        low: [f32; 3],
+        high: [f32; 3],
+        count: usize,
+        width: u32,
+        height: u32,
+    ) -> Result<Vec<Camera>> {
+        if !(1..=MOST_CAMERAS).contains(&count) {
+            return Err(Error::argument("count", count.to_string(), format!("1 to {MOST_CAMERAS} cameras")));
+        }
+        if !(self.elevation_degrees.abs() <= 89.0) {
+            let allowed = "-89 to 89 degrees";
+            return Err(Error::argument("elevation_degrees", self.elevation_degrees.to_string(), allowed));
+        }
+        if !(0..3).all(|k| low[k] <= high[k] && low[k].is_finite() && high[k].is_finite()) {
+            let found = format!("{low:?} to {high:?}");
+            return Err(Error::argument("bounds", found, "finite numbers, low not above high"));
+        }
+        let (low, high) = (DVec3::from(low.map(f64::from)), DVec3::from(high.map(f64::from)));
+        let (center, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let intrinsics = Intrinsics::from_fov(width, height, self.fov_y_degrees)?;
+        let unplaced = Camera::pinhole(width, height, intrinsics, Pose::IDENTITY)?;
+        let (sin, cos) = self.elevation_degrees.to_radians().sin_cos();
+        // The cylinder around the box fits between the picture's borders from every side.
+        let radius = half.x.hypot(half.y).max(LEAST_RADIUS_M);
+        let tangent = |side: u32| 0.5 * f64::from(side) / intrinsics.fx;
+        let for_width = radius / tangent(width).atan().sin();
+        let for_height = (half.z * cos + radius * sin.abs()) / tangent(height) + radius;
+        let distance = for_width.max(for_height);
+        let camera = |i: usize| {
+            let azimuth = std::f64::consts::TAU * i as f64 / count as f64;
+            let outwards = DVec3::new(azimuth.cos() * cos, azimuth.sin() * cos, sin);
+            let pose = Pose::look_at("turntable.", center + distance * outwards, center, DVec3::Z)?;
+            let camera = Camera { vehicle_from_camera: pose, ..unplaced };
+            camera.validate("turntable").map(|()| camera)
+        };
+        (0..count).map(camera).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_target_is_in_the_middle_and_what_lies_above_it_is_higher_in_the_picture() {
+        let (eye, target) = (DVec3::new(3.0, -4.0, 1.5), DVec3::new(0.2, 0.1, -0.3));
+        for up in [DVec3::Z, 1e200 * DVec3::Z, 1e-200 * DVec3::Z] {
+            let camera = Camera::look_at(eye, target, up, 40.0, 640, 480).unwrap();
+            assert_eq!(camera.center(), eye);
+            let pixel = |point| camera.pixel_from_vehicle(point).unwrap();
+            let [u, v] = pixel(target);
+            // Pixels are some 1e3, their steps 1e-13.
+            assert!((u - 320.0).abs() < 1e-10 && (v - 240.0).abs() < 1e-10, "{u} {v}");
+            let above = pixel(target + 0.1 * DVec3::Z);
+            assert!((above[0] - 320.0).abs() < 1e-10 && above[1] < 235.0, "{above:?}");
+            // Seen from the right side, the vehicle's front is on the right.
+            assert!(pixel(target + 0.1 * DVec3::X)[0] > 325.0);
+        }
+    }
+
+    #[test]
+    fn the_field_of_view_reaches_from_the_top_to_the_bottom_row() {
+        let camera =
+            Camera::look_at(DVec3::new(0.0, -5.0, 0.0), DVec3::ZERO, DVec3::Z, 60.0, 640, 480).unwrap();
+        let top = camera.pixel_from_vehicle(DVec3::new(0.0, 0.0, 5.0 * 30f64.to_radians().tan())).unwrap();
+        assert!((top[0] - 320.0).abs() < 1e-9 && top[1].abs() < 1e-9, "{top:?}");
+    }
+
+    #[test]
+    fn views_without_a_direction_are_refused_by_the_argument_that_makes_them_so() {
+        let look = |eye, target, up, fov| Camera::look_at(eye, target, up, fov, 64, 48);
+        let (o, x, z) = (DVec3::ZERO, DVec3::X, DVec3::Z);
+        for (camera, beginning) in [
+            (look(x, x, z, 40.0), "target: "),
+            (look(x, o, x, 40.0), "up: "),
+            (look(x, o, o, 40.0), "up: "),
+            (look(DVec3::NAN, o, z, 40.0), "eye: "),
+            (look(x, DVec3::new(f64::INFINITY, 0.0, 0.0), z, 40.0), "target: "),
+            (look(x, o, z, 0.0), "fov_y_degrees: "),
+            (look(x, o, z, 180.0), "fov_y_degrees: "),
+            (look(x, o, z, f64::NAN), "fov_y_degrees: "),
+            (look(1e300 * x, -1e300 * x, z, 40.0), "camera.vehicle_from_camera: "),
+        ] {
+            let error = camera.unwrap_err().to_string();
+            assert!(error.starts_with(beginning), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_turntable_has_the_whole_box_in_every_picture_and_begins_in_front() {
+        let (low, high) = ([-2.5, -0.9, -0.7], [2.1, 0.8, 0.9]);
+        for (elevation_degrees, width, height) in [(12.0, 640, 480), (-20.0, 300, 900), (80.0, 900, 300)] {
+            let table = Turntable { elevation_degrees, ..Turntable::default() };
+            let cameras = table.cameras(low, high, 7, width, height).unwrap();
+            assert_eq!(cameras.len(), 7);
+            assert!(cameras[0].center().x > 2.1 && cameras[1].center().y > 0.8);
+            for camera in &cameras {
+                for corner in 0..8 {
+                    let side = |k: usize| f64::from(if corner >> k & 1 == 0 { low[k] } else { high[k] });
+                    let [u, v] = camera.pixel_from_vehicle(DVec3::new(side(0), side(1), side(2))).unwrap();
+                    let inside =
+                        (0.0..=f64::from(width)).contains(&u) && (0.0..=f64::from(height)).contains(&v);
+                    assert!(inside, "elevation {elevation_degrees}, corner {corner}: {u} {v}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn turntables_that_cannot_be_are_refused() {
+        let cameras = |table: Turntable, low, count| table.cameras(low, [1.0; 3], count, 64, 48);
+        let (usual, low) = (Turntable::default(), [-1.0; 3]);
+        for (made, beginning) in [
+            (cameras(usual, low, 0), "count: "),
+            (cameras(usual, low, 100_001), "count: "),
+            (cameras(usual, [-1.0, 2.0, -1.0], 3), "bounds: "),
+            (cameras(usual, [f32::NAN; 3], 3), "bounds: "),
+            (usual.cameras(low, [1.0; 3], 3, 0, 48), "camera.size: "),
+            (usual.cameras(low, [1.0; 3], 3, 64, 8193), "camera.size: "),
+            (usual.cameras([-3e38; 3], [3e38; 3], 3, 64, 48), "turntable.vehicle_from_camera: "),
+            (cameras(Turntable { elevation_degrees: 89.5, ..usual }, low, 3), "elevation_degrees: "),
+            (cameras(Turntable { elevation_degrees: f64::NAN, ..usual }, low, 3), "elevation_degrees: "),
+            (cameras(Turntable { fov_y_degrees: 200.0, ..usual }, low, 3), "fov_y_degrees: "),
+        ] {
+            let error = made.unwrap_err().to_string();
+            assert!(error.starts_with(beginning), "{error}");
+        }
+        assert_eq!(cameras(usual, [1.0; 3], 1).unwrap().len(), 1);
+    }
+}
