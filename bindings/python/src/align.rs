@@ -1,6 +1,6 @@
 //! From the world of a structure-from-motion model to the vehicle's frame; `vehicle_gaussians._align` names the numbers.
 
-use crate::arrays::{floats, matrix4, numbers, owned, shape_text, values, vector};
+use crate::arrays::{floats, matrix4, owned, rows, shape_text, values, vector};
 use crate::camera::Camera;
 use crate::errors::{bad_value, from_library, renamed};
 use crate::reconstruct::mask;
@@ -42,7 +42,7 @@ pub(crate) fn align_scan<'py>(
     // A copy: others may write to the array while the library works.
     let points = values(&scan)?.as_chunks::<3>().0.to_vec();
     let views = views_of(py, &masks, &cameras, names)?;
-    let sparse = sparse.map_or_else(|| Ok(Vec::new()), |object| rows(object, "sparse"))?;
+    let sparse = sparse.map_or_else(|| Ok(Vec::new()), |object| rows::<3>(object, "sparse"))?;
     let heading = heading_of(py, heading)?;
     let found = watched(py, threads, "align", progress, |watch| {
         let scan = Cloud::new(points).map_err(|e| renamed(e, "cloud", "scan"))?;
@@ -65,7 +65,7 @@ pub(crate) fn align_box<'py>(
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Found<'py>> {
     let views = views_of(py, &masks, &cameras, names)?;
-    let (sparse, size) = (rows(sparse, "sparse")?, vector::<3>(size, "size")?);
+    let (sparse, size) = (rows::<3>(sparse, "sparse")?, vector::<3>(size, "size")?);
     let heading = heading_of(py, heading)?;
     let BoxAlignment { vehicle_from_world, residual_m, confidence, views, .. } =
         watched(py, threads, "align", progress, |watch| {
@@ -100,7 +100,7 @@ pub(crate) fn align_points<'py>(
     vehicle: &Bound<'py, PyAny>,
 ) -> PyResult<Fitted<'py>> {
     let py = world.py();
-    let (from, to) = (rows(world, "world")?, rows(vehicle, "vehicle")?);
+    let (from, to) = (rows::<3>(world, "world")?, rows::<3>(vehicle, "vehicle")?);
     if from.len() != to.len() {
         let allowed = format!("as many as world, {}", from.len());
         return Err(bad_value(py, "vehicle", &to.len().to_string(), &allowed));
@@ -171,16 +171,6 @@ fn views_of(
         View::without_picture(name, camera, mask).map_err(|e| from_library(py, e))
     };
     cameras.iter().enumerate().map(view).collect()
-}
-
-/// Points in three columns.
-fn rows(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<Vec<[f64; 3]>> {
-    let allowed = "an (n, 3) array";
-    let (shape, values) = numbers(object, argument, allowed)?;
-    match shape[..] {
-        [_, 3] => Ok(values.as_chunks::<3>().0.to_vec()),
-        _ => Err(bad_value(object.py(), argument, &shape_text(&shape), allowed)),
-    }
 }
 
 fn heading_of(py: Python<'_>, name: &str) -> PyResult<Heading> {

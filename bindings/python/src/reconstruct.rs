@@ -139,7 +139,7 @@ fn refinement(
     }
 }
 
-fn scene_of(
+pub(crate) fn scene_of(
     py: Python<'_>,
     images: &[Bound<'_, PyAny>],
     masks: Option<&[Bound<'_, PyAny>]>,

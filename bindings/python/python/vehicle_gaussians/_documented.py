@@ -13,9 +13,14 @@ T = TypeVar("T")
 
 def documented(cls: type[T]) -> type[T]:
     """Gives the fields of a named tuple the strings that follow them in the source."""
-    for field, text in _texts(cls.__module__).get(cls.__name__, {}).items():
+    for field, text in field_texts(cls).items():
         getattr(cls, field).__doc__ = text
     return cls
+
+
+def field_texts(cls: type) -> dict[str, str]:
+    """The strings that follow the fields of a class in the source."""
+    return _texts(cls.__module__).get(cls.__name__, {})
 
 
 @functools.lru_cache

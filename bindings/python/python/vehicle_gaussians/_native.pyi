@@ -1,7 +1,7 @@
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Literal, SupportsIndex, final, overload
+from typing import Any, Literal, SupportsIndex, final, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -27,8 +27,10 @@ __all__ = [
     "picture_errors",
     "pose_from_box",
     "pose_from_colmap",
+    "pose_from_opencv",
     "pose_from_opengl",
     "reconstruct",
+    "refine",
     "segment",
     "similarity_from_points",
     "surface_errors",
@@ -56,15 +58,47 @@ class Camera:
         distortion: npt.ArrayLike | None = None,
     ) -> Camera: ...
     @staticmethod
+    @overload
     def from_opencv(
         K: npt.ArrayLike,
         vehicle_from_camera: npt.ArrayLike,
-        width: SupportsIndex,
-        height: SupportsIndex,
+        width: int,
+        height: int,
         distortion: npt.ArrayLike | None = None,
         *,
         fisheye: bool = False,
     ) -> Camera: ...
+    @staticmethod
+    @overload
+    def from_opencv(
+        K: npt.ArrayLike,
+        vehicle_from_camera: None = None,
+        width: int = 0,
+        height: int = 0,
+        distortion: npt.ArrayLike | None = None,
+        *,
+        fisheye: bool = False,
+        rvec: npt.ArrayLike,
+        tvec: npt.ArrayLike,
+        vehicle_from_world: npt.ArrayLike | None = None,
+    ) -> Camera: ...
+    @staticmethod
+    def look_at(
+        eye: npt.ArrayLike,
+        target: npt.ArrayLike,
+        width: int,
+        height: int,
+        *,
+        fov_y_degrees: float = 35.0,
+        up: npt.ArrayLike = (0.0, 0.0, 1.0),
+    ) -> Camera: ...
+    @overload
+    def project(self, points: npt.ArrayLike, depth: Literal[False] = False) -> npt.NDArray[np.float64]: ...
+    @overload
+    def project(
+        self, points: npt.ArrayLike, depth: Literal[True]
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
+    def unproject(self, pixels: npt.ArrayLike, depths: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
     def scaled(self, width: SupportsIndex, height: SupportsIndex) -> Camera: ...
     def cropped(self, x: SupportsIndex, y: SupportsIndex, width: SupportsIndex, height: SupportsIndex) -> Camera: ...
     def with_pose(self, vehicle_from_camera: npt.ArrayLike) -> Camera: ...
@@ -124,6 +158,23 @@ class Gaussians:
     @staticmethod
     def load_ply(path: str | PathLike[str]) -> Gaussians: ...
     def save_ply(self, path: str | PathLike[str]) -> None: ...
+    @staticmethod
+    def from_ply_bytes(data: bytes | bytearray | memoryview) -> Gaussians: ...
+    def to_ply_bytes(self) -> bytes: ...
+    def __getitem__(
+        self, index: slice | Sequence[int] | Sequence[bool] | npt.NDArray[np.integer[Any] | np.bool_], /
+    ) -> Gaussians: ...
+    def cropped(self, low: npt.ArrayLike, high: npt.ArrayLike) -> Gaussians: ...
+    def covariances(self) -> npt.NDArray[np.float32]: ...
+    def turntable(
+        self,
+        count: int,
+        width: int,
+        height: int,
+        *,
+        elevation_degrees: float = 12.0,
+        fov_y_degrees: float = 35.0,
+    ) -> list[Camera]: ...
     def mirrored(self) -> Gaussians: ...
     def transformed(self, to_from_vehicle: npt.ArrayLike) -> Gaussians: ...
     def merged(self, other: Gaussians) -> Gaussians: ...
@@ -309,6 +360,9 @@ def pose_from_colmap(
     tvec: npt.ArrayLike,
     vehicle_from_world: npt.ArrayLike | None = None,
 ) -> npt.NDArray[np.float64]: ...
+def pose_from_opencv(
+    rvec: npt.ArrayLike, tvec: npt.ArrayLike, vehicle_from_world: npt.ArrayLike | None = None
+) -> npt.NDArray[np.float64]: ...
 def pose_from_opengl(
     camera_to_world: npt.ArrayLike,
     vehicle_from_world: npt.ArrayLike | None = None,
@@ -412,6 +466,21 @@ def reconstruct(
     names: Sequence[str] | None,
     progress: Progress | None,
 ) -> tuple[Gaussians, str, tuple[npt.NDArray[np.float32], npt.NDArray[np.uint8]] | None]: ...
+def refine(
+    gaussians: Gaussians,
+    images: Sequence[npt.NDArray[np.uint8]],
+    masks: Sequence[npt.NDArray[np.generic] | None],
+    cameras: Sequence[Camera],
+    depths: Sequence[Floats | None],
+    names: Sequence[str],
+    iterations: int | None,
+    seconds: float | None,
+    hold_out: bool,
+    densify: bool,
+    backend: Backend,
+    threads: int,
+    progress: Progress | None,
+) -> tuple[Gaussians, str]: ...
 def open_scene(
     path: str | PathLike[str],
     views: Sequence[str] | None,
