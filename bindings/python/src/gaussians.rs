@@ -53,7 +53,7 @@ impl Gaussians {
 
 #[pymethods]
 impl Gaussians {
-    /// From float32 arrays of n Gaussians: means (n, 3) and scales (n, 3), standard deviations, in metres; quats
+    /// From arrays of floats, of n Gaussians: means (n, 3) and scales (n, 3), standard deviations, in metres; quats
     /// (n, 4) as (w, x, y, z) of any norm; opacities (n,) from 0 to 1; sh (n, (degree + 1)^2, 3).
     ///
     ///     >>> means, scales, quats = np.zeros((2, 3)), np.full((2, 3), 0.1), np.tile([1.0, 0, 0, 0], (2, 1))

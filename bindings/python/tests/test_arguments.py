@@ -62,7 +62,8 @@ def test_files_that_are_not_there_or_broken_are_what_python_calls_them(face: Any
         with pytest.raises(FileNotFoundError, match=r"no(\.ply)?") as caught:
             call()
         assert isinstance(caught.value, vg.VgError) and caught.value.code is Status.IO
-        assert caught.value.errno == errno.ENOENT
+        assert (caught.value.errno, caught.value.strerror) == (errno.ENOENT, os.strerror(errno.ENOENT))
+        assert str(caught.value.filename).startswith(str(tmp_path / "no"))
     (tmp_path / "bad.ply").write_text("ply or not")
     with pytest.raises(ValueError, match=r"bad\.ply") as broken:
         face.Gaussians.load_ply(tmp_path / "bad.ply")
@@ -100,6 +101,7 @@ def reconstructing(face: Any, ellipsoid: Views, **changed: Any) -> Callable[[], 
 def test_a_number_that_does_not_fit_is_a_value_error_that_names_it(face: Any, ellipsoid: Views) -> None:
     a, g, view = ellipsoid.images[0], some(face), ellipsoid.cameras[0]
     cases: list[tuple[str, Callable[[], Any]]] = [
+        ("images: none; allowed: at least one", lambda: face.reconstruct([], None, [])),
         ("width: -1; allowed: 1 to 8192", lambda: camera(face, width=-1)),
         ("height: 99999999999; allowed: 1 to 8192", lambda: camera(face, height=99999999999)),
         ("sh_degree: -1; allowed: 0 to 3", reconstructing(face, ellipsoid, sh_degree=-1)),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -57,6 +59,46 @@ def test_only_the_c_library_is_called_libvg() -> None:
     # A program in the same process that needs libvg.so.0 would be given the extension module instead.
     native = Path(vg._native.__file__).read_bytes()
     assert b"libvg.so.0" not in native and b"libvg.so.0" in capi.library_path().read_bytes()
+
+
+def test_ctypes_works_without_the_extension_module_and_the_rest_says_what_is_missing(tmp_path: Path) -> None:
+    shutil.copytree(PACKAGE, tmp_path / "vehicle_gaussians", ignore=shutil.ignore_patterns("_native*", "__pycache__"))
+    code = f"""
+from vehicle_gaussians import capi
+import vehicle_gaussians as vg
+assert vg.__file__.startswith({str(tmp_path)!r}) and vg.__version__ == capi.version()
+car = capi.Gaussians.from_arrays([[0.0, 0, 3]], [[1.0] * 3], [[1.0, 0, 0, 0]], [0.9], [[[1.0] * 3]])
+camera = capi.camera_from_colmap("PINHOLE", 8, 8, [9, 9, 4, 4], [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]])
+assert (car.render(camera) < 255).any()
+assert not isinstance(car, vg.Gaussians) and not isinstance(car, vg.Camera)
+calls = [
+    lambda: vg.Camera.from_matrix([], [], 1, 1),
+    lambda: vg.Gaussians.load_ply("car.ply"),
+    lambda: vg.Renderer(car),
+    lambda: vg.Model("m.onnx"),
+    lambda: vg.open_scene("car"),
+    lambda: vg.reconstruct([], None, []),
+    lambda: vg.align_points([], []),
+    lambda: vg.picture_errors(1, 2),
+    lambda: vg.pose_from_box(1, 2),
+]
+for call in calls:
+    try:
+        call()
+    except ImportError as error:
+        assert "needs the extension module" in str(error) and "vehicle_gaussians.capi" in str(error), error
+    else:
+        raise SystemExit("no error")
+"""
+    ran = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", "")
 
 
 def test_everything_public_has_a_docstring() -> None:

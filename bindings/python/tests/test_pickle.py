@@ -120,6 +120,8 @@ def test_what_belongs_to_its_process_is_refused_with_the_way_out(face: Any) -> N
                 way(thing)
         with pytest.raises(TypeError, match="cannot be pickled or copied"):
             pickle.dumps({"held": [thing]})
+    # A package without networks opens no model that could be refused here.
+    assert "__reduce__" in vars(vg.Model) and "__reduce__" in vars(vg.Renderer)
 
 
 @pytest.mark.parametrize("face", FACES)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import functools
 import inspect
 import sys
 from typing import TypeVar
@@ -20,12 +19,16 @@ def documented(cls: type[T]) -> type[T]:
 
 def field_texts(cls: type) -> dict[str, str]:
     """The strings that follow the fields of a class in the source."""
-    return _texts(cls.__module__).get(cls.__name__, {})
+    if cls.__module__ not in _TEXTS:
+        _TEXTS[cls.__module__] = _texts(cls.__module__)
+    return _TEXTS[cls.__module__].get(cls.__name__, {})
 
 
-@functools.lru_cache
+#: Strings after fields, by module, class and field.
+_TEXTS: dict[str, dict[str, dict[str, str]]] = {}
+
+
 def _texts(module: str) -> dict[str, dict[str, str]]:
-    """Strings after fields, by class and field."""
     try:
         tree = ast.parse(inspect.getsource(sys.modules[module]))
     except OSError:

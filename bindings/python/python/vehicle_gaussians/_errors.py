@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import os
 import re
 
 
@@ -70,11 +71,16 @@ class FormatError(VgError, ValueError):
 
 
 class FileError(VgError, OSError):
-    """The operating system refused a file operation (IO); ``errno`` holds its number, where there is one."""
+    """The operating system refused a file operation (IO); ``errno``, ``strerror`` and ``filename`` are the system's, where
+    it was its own refusal."""
 
     def __init__(self, code: int, message: str) -> None:
         super().__init__(code, message)
         self.errno = _errno(message)
+        if self.errno is not None:
+            self.strerror = os.strerror(self.errno)
+            name, words, _ = message.partition(f": {self.strerror} (os error {self.errno})")
+            self.filename = name if words else None
 
 
 class FileMissingError(FileError, FileNotFoundError):

@@ -41,6 +41,12 @@ __version__: str
 
 @final
 class Camera:
+    """A posed camera. It does not change: methods return new ones.
+
+    >>> K = [[600, 0, 320], [0, 600, 240], [0, 0, 1]]
+    >>> camera = Camera.from_matrix(K, vehicle_from_camera, width=640, height=480)
+    >>> half = camera.scaled(320, 240)
+    """
     @staticmethod
     def from_colmap(
         model: str | SupportsIndex,
@@ -48,7 +54,15 @@ class Camera:
         height: SupportsIndex,
         params: npt.ArrayLike,
         vehicle_from_camera: npt.ArrayLike,
-    ) -> Camera: ...
+    ) -> Camera:
+        """From a COLMAP camera model, by name or number, and its parameters in COLMAP's order.
+
+        vehicle_from_camera is a 3x4 or 4x4 rigid transform in metres; camera axes are x right, y down, z forward.
+
+            >>> camera = Camera.from_colmap("SIMPLE_RADIAL", 640, 480, [600, 320, 240, -0.05], vehicle_from_camera)
+            >>> camera.model
+            'OPENCV'
+        """
     @staticmethod
     def from_matrix(
         K: npt.ArrayLike,
@@ -56,7 +70,14 @@ class Camera:
         width: SupportsIndex,
         height: SupportsIndex,
         distortion: npt.ArrayLike | None = None,
-    ) -> Camera: ...
+    ) -> Camera:
+        """From a 3x3 matrix K of focal lengths and principal point in pixels, without skew.
+
+        The centre of the top-left pixel is (0.5, 0.5), as in COLMAP: a principal point in the middle is width / 2. For
+        the K of OpenCV's calibration use from_opencv. distortion is k1, k2, p1, p2[, k3[, k4, k5, k6]].
+
+            >>> camera = Camera.from_matrix([[600, 0, 320], [0, 600, 240], [0, 0, 1]], vehicle_from_camera, 640, 480)
+        """
     @staticmethod
     @overload
     def from_opencv(
@@ -103,17 +124,23 @@ class Camera:
     def cropped(self, x: SupportsIndex, y: SupportsIndex, width: SupportsIndex, height: SupportsIndex) -> Camera: ...
     def with_pose(self, vehicle_from_camera: npt.ArrayLike) -> Camera: ...
     @property
-    def width(self) -> int: ...
+    def width(self) -> int:
+        """Columns."""
     @property
-    def height(self) -> int: ...
+    def height(self) -> int:
+        """Rows."""
     @property
-    def K(self) -> npt.NDArray[np.float64]: ...
+    def K(self) -> npt.NDArray[np.float64]:
+        """3x3; the centre of the top-left pixel is (0.5, 0.5)."""
     @property
-    def vehicle_from_camera(self) -> npt.NDArray[np.float64]: ...
+    def vehicle_from_camera(self) -> npt.NDArray[np.float64]:
+        """4x4, metres."""
     @property
-    def model(self) -> Literal["PINHOLE", "OPENCV", "FULL_OPENCV", "OPENCV_FISHEYE"]: ...
+    def model(self) -> Literal["PINHOLE", "OPENCV", "FULL_OPENCV", "OPENCV_FISHEYE"]:
+        """The COLMAP model that holds this lens: PINHOLE, OPENCV, FULL_OPENCV or OPENCV_FISHEYE."""
     @property
-    def params(self) -> npt.NDArray[np.float64]: ...
+    def params(self) -> npt.NDArray[np.float64]:
+        """The parameters of that model, in COLMAP's order."""
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
@@ -122,11 +149,20 @@ class Camera:
 
 @final
 class Renderer:
+    """Gaussians made ready to be drawn many times. backend is "auto", a graphics processor where this build and this
+    machine have one and there are 20,000 Gaussians or more, else the CPU; "cpu"; or "gpu", an error without. Under
+    "auto" the CPU goes on should the device fail.
+
+        >>> ready = Renderer(car, "cpu")
+        >>> pictures = [ready.render(camera) for camera in cameras]
+    """
     def __new__(cls, gaussians: Gaussians, backend: Backend = "auto") -> Renderer: ...
     @property
-    def backend(self) -> Literal["cpu", "gpu"]: ...
+    def backend(self) -> Literal["cpu", "gpu"]:
+        """Who draws: "cpu" or "gpu"."""
     @property
-    def choice(self) -> str: ...
+    def choice(self) -> str:
+        """Who draws, and why."""
     def render(
         self,
         camera: Camera,
@@ -137,7 +173,12 @@ class Renderer:
         near: float = 0.01,
         far: float = 1e10,
         sh_degree: int = 3,
-    ) -> npt.NDArray[np.uint8]: ...
+    ) -> npt.NDArray[np.uint8]:
+        """The picture a camera takes: uint8 (height, width, 3), or (height, width, 4) with straight alpha on a
+        "transparent" background. Arguments are those of Gaussians.render.
+
+            >>> picture = Renderer(car).render(camera, "transparent")
+        """
     def render_many(
         self,
         cameras: Sequence[Camera],
@@ -153,8 +194,24 @@ class Renderer:
 
 @final
 class Gaussians:
+    """The Gaussians of a vehicle, in its frame (x forward, y left, z up, metres). They do not change: methods return
+    new ones, and the arrays are read-only views that keep them alive.
+
+        >>> car = Gaussians.load_ply("car.ply")
+        >>> picture = car.render(camera)
+        >>> red = car.sh.copy()
+        >>> red[:, 0] = [1.77, -1.77, -1.77]
+        >>> car = Gaussians.from_arrays(car.means, car.scales, car.quats, car.opacities, red)
+    """
     @staticmethod
-    def from_arrays(means: Floats, scales: Floats, quats: Floats, opacities: Floats, sh: Floats) -> Gaussians: ...
+    def from_arrays(means: Floats, scales: Floats, quats: Floats, opacities: Floats, sh: Floats) -> Gaussians:
+        """From arrays of floats, of n Gaussians: means (n, 3) and scales (n, 3), standard deviations, in metres; quats
+        (n, 4) as (w, x, y, z) of any norm; opacities (n,) from 0 to 1; sh (n, (degree + 1)^2, 3).
+
+            >>> means, scales, quats = np.zeros((2, 3)), np.full((2, 3), 0.1), np.tile([1.0, 0, 0, 0], (2, 1))
+            >>> Gaussians.from_arrays(means, scales, quats, opacities=np.ones(2), sh=np.zeros((2, 1, 3)))
+            Gaussians(2, sh_degree=0)
+        """
     @staticmethod
     def load_ply(path: str | PathLike[str]) -> Gaussians: ...
     def save_ply(self, path: str | PathLike[str]) -> None: ...
@@ -191,7 +248,17 @@ class Gaussians:
         near: float = 0.01,
         far: float = 1e10,
         sh_degree: int = 3,
-    ) -> npt.NDArray[np.uint8]: ...
+    ) -> npt.NDArray[np.uint8]:
+        """The picture a camera takes: uint8 (height, width, 3), or (height, width, 4) with straight alpha on a
+        "transparent" background. With dtype float32 colours are not clamped above 1. With depth=True a pair of the
+        picture and its depth in metres, float32 (height, width), 0 where there is nothing.
+
+        background is "white", "black", "transparent" or (r, g, b) from 0 to 1; near and far are metres; sh_degree leaves
+        out the colour's bands above it; threads=0 means one per core.
+
+            >>> picture = car.render(camera)
+            >>> rgba, depth = car.render(camera, "transparent", depth=True)
+        """
     @overload
     def render(
         self,
@@ -302,7 +369,14 @@ class Gaussians:
         sh_degree: int = 3,
         depth_mode: DepthMode = "expected",
         backend: Backend = "auto",
-    ) -> Planes: ...
+    ) -> Planes:
+        """The picture as losses look at it: Planes of color (height, width, 3), over the background or, with a
+        "transparent" one, premultiplied; alpha and depth (height, width). All float32; arguments as those of render,
+        and depth_mode, "expected" or "accumulated": depth times alpha. backend is "cpu", "gpu", an error without, or
+        "auto", the CPU: Renderer is for Gaussians that are drawn many times.
+
+            >>> color, alpha, depth = car.render_planes(camera, "black")
+        """
     def render_backward(
         self,
         camera: Camera,
@@ -318,21 +392,41 @@ class Gaussians:
         sh_degree: int = 3,
         depth_mode: DepthMode = "expected",
         backend: Backend = "auto",
-    ) -> Gradients: ...
+    ) -> Gradients:
+        """Goes back from the gradient of a loss with respect to the planes of a picture, as render_planes draws it, to
+        Gradients of everything the picture is made of. color (height, width, 3), alpha and depth (height, width) are
+        float32, finite; None where the loss does not look. The picture is drawn again on the way.
+
+        Constants are the order of depth, the pixels a Gaussian reaches, what is too faint to be drawn, near and far.
+
+            >>> planes = car.render_planes(camera)
+            >>> gradients = car.render_backward(camera, color=2 * (planes.color - photograph))
+            >>> gradients.means.shape == car.means.shape
+            True
+        """
     @property
-    def means(self) -> npt.NDArray[np.float32]: ...
+    def means(self) -> npt.NDArray[np.float32]:
+        """Centres, metres. (n, 3)"""
     @property
-    def scales(self) -> npt.NDArray[np.float32]: ...
+    def scales(self) -> npt.NDArray[np.float32]:
+        """Standard deviations along the Gaussians' own axes, metres. (n, 3)"""
     @property
-    def quats(self) -> npt.NDArray[np.float32]: ...
+    def quats(self) -> npt.NDArray[np.float32]:
+        """vehicle_from_gaussian, unit quaternions (w, x, y, z). (n, 4)"""
     @property
-    def opacities(self) -> npt.NDArray[np.float32]: ...
+    def opacities(self) -> npt.NDArray[np.float32]:
+        """Peak opacities, 0 to 1. (n,)"""
     @property
-    def sh(self) -> npt.NDArray[np.float32]: ...
+    def sh(self) -> npt.NDArray[np.float32]:
+        """Spherical harmonics in the order and with the signs of 3D Gaussian Splatting, RGB last:
+        colour = 0.5 + sum of coefficient times basis. (n, (degree + 1)^2, 3)
+        """
     @property
-    def sh_degree(self) -> int: ...
+    def sh_degree(self) -> int:
+        """Highest degree of the spherical harmonics, 0 to 3."""
     @property
-    def bounds(self) -> npt.NDArray[np.float32] | None: ...
+    def bounds(self) -> npt.NDArray[np.float32] | None:
+        """Lowest and highest centre, metres, or None when there is no Gaussian. (2, 3)"""
     def __len__(self) -> int: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
@@ -342,6 +436,14 @@ class Gaussians:
 
 @final
 class Model:
+    """A network in an ONNX file, opened by ONNX Runtime, for reconstruct's prior_model and head_model.
+
+    It is opened once and may be used by any number of threads at a time; runs of it take turns. It holds its weights
+    and threads until nobody refers to it any more. Not for a forked process.
+
+        >>> network = Model("depth.onnx")  # doctest: +SKIP
+        >>> made = reconstruct(images, masks, cameras, prior="onnx", prior_model=network)  # doctest: +SKIP
+    """
     def __new__(
         cls,
         path: str | PathLike[str],
@@ -353,7 +455,8 @@ class Model:
         arena: bool = False,
     ) -> Model: ...
     @property
-    def path(self) -> Path: ...
+    def path(self) -> Path:
+        """The file."""
 
 def pose_from_colmap(
     qvec: npt.ArrayLike,
@@ -366,9 +469,30 @@ def pose_from_opencv(
 def pose_from_opengl(
     camera_to_world: npt.ArrayLike,
     vehicle_from_world: npt.ArrayLike | None = None,
-) -> npt.NDArray[np.float64]: ...
-def pose_from_box(ego_from_vehicle: npt.ArrayLike, ego_from_camera: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
-def similarity_from_points(source: npt.ArrayLike, target: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
+) -> npt.NDArray[np.float64]:
+    """vehicle_from_camera (4x4) of a camera-to-world matrix with OpenGL's camera axes (x right, y up, z backward), as in
+    nerfstudio's transforms.json and in Blender.
+
+    vehicle_from_world is the similarity (4x4) from that world to the vehicle's frame; without, they are one.
+
+        >>> vehicle_from_camera = pose_from_opengl(frame["transform_matrix"])
+    """
+
+def pose_from_box(ego_from_vehicle: npt.ArrayLike, ego_from_camera: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """vehicle_from_camera (4x4) of a vehicle that was tracked as a box: the poses (3x4 or 4x4, metres) of the box and of
+    the camera in one frame (ego, map, UTM) at the moment of the picture. The box's axes are x forward, y left, z up, and
+    its origin lies on the vehicle's plane of symmetry.
+
+        >>> vehicle_from_camera = pose_from_box(ego_from_vehicle, ego_from_camera)
+    """
+
+def similarity_from_points(source: npt.ArrayLike, target: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """The similarity (4x4) that best takes points onto points, both (n, 3) with n >= 3 (Umeyama 1991): for example
+    vehicle_from_world from camera centres that are known in both frames.
+
+        >>> vehicle_from_world = similarity_from_points(centers_in_world, centers_in_vehicle)
+    """
+
 def align_scan(
     masks: Sequence[npt.NDArray[np.generic] | None],
     cameras: Sequence[Camera],
@@ -435,7 +559,16 @@ def segment(
     image: npt.NDArray[np.uint8],
     camera: Camera,
     threads: int = 0,
-) -> npt.NDArray[np.bool_]: ...
+) -> npt.NDArray[np.bool_]:
+    """The mask of a photograph that has none, by a segmentation network: bool (height, width), True where the vehicle is
+    that stands at the origin of the camera's vehicle frame.
+
+    image: RGB, uint8 (height, width, 3); with a fourth channel, alpha is not looked at.
+    threads: worker threads; 0 means one per core.
+
+        >>> mask = segment(Model("segmentation.onnx"), images[0], cameras[0])  # doctest: +SKIP
+    """
+
 def reconstruct(
     images: Sequence[object],
     masks: Sequence[object] | None,

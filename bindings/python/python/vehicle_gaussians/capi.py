@@ -33,6 +33,7 @@ from typing import Any, Literal, NamedTuple, NoReturn, Protocol, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from . import _types
 from ._alignment import Alignment
 from ._arguments import bad_type, bad_value, doubles, floats, listed, pose, real, whole
 from ._equal import equal_by_value
@@ -908,11 +909,11 @@ class Gaussians:
     @classmethod
     def from_arrays(
         cls,
-        means: npt.NDArray[np.float32],
-        scales: npt.NDArray[np.float32],
-        quats: npt.NDArray[np.float32],
-        opacities: npt.NDArray[np.float32],
-        sh: npt.NDArray[np.float32],
+        means: _types.Floats,
+        scales: _types.Floats,
+        quats: _types.Floats,
+        opacities: _types.Floats,
+        sh: _types.Floats,
     ) -> Gaussians:
         """Copies arrays of shapes (n, 3), (n, 3), (n, 4), (n,) and (n, (degree + 1)^2, 3)."""
         given = {"means": means, "scales": scales, "quats": quats, "opacities": opacities, "sh": sh}
@@ -952,7 +953,7 @@ class Gaussians:
     def render(
         self,
         camera: Camera,
-        background: str | Sequence[float] = "white",
+        background: _types.Background = "white",
         *,
         dtype: npt.DTypeLike = np.uint8,
         antialiased: bool = False,
@@ -964,7 +965,7 @@ class Gaussians:
     def render_with_depth(
         self,
         camera: Camera,
-        background: str | Sequence[float] = "white",
+        background: _types.Background = "white",
         *,
         dtype: npt.DTypeLike = np.uint8,
         antialiased: bool = False,
@@ -978,7 +979,7 @@ class Gaussians:
     def _draw(
         self,
         camera: Camera,
-        background: str | Sequence[float],
+        background: _types.Background,
         dtype: np.dtype[Any],
         antialiased: bool,
         context: Context | None,
@@ -1005,11 +1006,11 @@ class Gaussians:
     def render_planes(
         self,
         camera: Camera,
-        background: str | Sequence[float] = "white",
+        background: _types.Background = "white",
         *,
         antialiased: bool = False,
-        depth_mode: Literal["expected", "accumulated"] = "expected",
-        backend: Literal["auto", "cpu", "gpu"] = "auto",
+        depth_mode: _types.DepthMode = "expected",
+        backend: _types.Backend = "auto",
         context: Context | None = None,
     ) -> Planes:
         """The picture as losses look at it: colour over the background or premultiplied, alpha, and depth."""
@@ -1028,14 +1029,14 @@ class Gaussians:
     def render_backward(
         self,
         camera: Camera,
-        color: npt.NDArray[np.float32] | None = None,
-        alpha: npt.NDArray[np.float32] | None = None,
-        depth: npt.NDArray[np.float32] | None = None,
-        background: str | Sequence[float] = "white",
+        color: _types.Floats | None = None,
+        alpha: _types.Floats | None = None,
+        depth: _types.Floats | None = None,
+        background: _types.Background = "white",
         *,
         antialiased: bool = False,
-        depth_mode: Literal["expected", "accumulated"] = "expected",
-        backend: Literal["auto", "cpu", "gpu"] = "auto",
+        depth_mode: _types.DepthMode = "expected",
+        backend: _types.Backend = "auto",
         context: Context | None = None,
     ) -> Gradients:
         """Gradients of everything a picture is made of, from those of a loss with respect to its planes; the arguments
@@ -1146,7 +1147,7 @@ class Renderer(_Handle):
     def __init__(
         self,
         gaussians: Gaussians,
-        backend: Literal["auto", "cpu", "gpu"] = "auto",
+        backend: _types.Backend = "auto",
         context: Context | None = None,
     ) -> None:
         options = _initial(vg_renderer_options)
@@ -1169,7 +1170,7 @@ class Renderer(_Handle):
     def render(
         self,
         cameras: Sequence[Camera],
-        background: str | Sequence[float] = "white",
+        background: _types.Background = "white",
         *,
         antialiased: bool = False,
         progress: Progress | None = None,
@@ -1194,7 +1195,7 @@ class Renderer(_Handle):
         return pictures
 
 
-def _render_options(background: str | Sequence[float], antialiased: bool, context: Context | None) -> vg_render_options:
+def _render_options(background: _types.Background, antialiased: bool, context: Context | None) -> vg_render_options:
     options: vg_render_options = _initial(vg_render_options)
     options.context = _lent_context(context)
     options.antialiased = antialiased
@@ -1236,21 +1237,21 @@ class Reconstruction(NamedTuple):
 
 def reconstruct(
     images: Iterable[npt.NDArray[np.uint8]],
-    masks: Iterable[npt.NDArray[np.bool_] | npt.NDArray[np.uint8] | None] | None,
+    masks: Iterable[_types.Mask | None] | None,
     cameras: Iterable[Camera],
-    depths: Iterable[npt.NDArray[np.float32] | None] | None = None,
+    depths: Iterable[_types.Floats | None] | None = None,
     *,
-    prior: Literal["auto", "given", "hull", "shape", "onnx"] = "auto",
+    prior: _types.Prior = "auto",
     prior_model: Model | None = None,
     head_model: Model | None = None,
-    calibrate: Literal["auto", "off"] = "auto",
-    symmetry: Literal["auto", "always", "never", "flip"] = "auto",
-    relight: Literal["auto", "never"] = "auto",
+    calibrate: _types.Calibrate = "auto",
+    symmetry: _types.Symmetry = "auto",
+    relight: _types.Relight = "auto",
     photo: bool = True,
-    cloud: npt.NDArray[np.float32] | None = None,
-    vehicle_size: Sequence[float] | None = None,
+    cloud: _types.Floats | None = None,
+    vehicle_size: _types.Size | None = None,
     sh_degree: int = 2,
-    keep: Keep | int | str | Iterable[str] = 0,
+    keep: Keep | int | _types.Keep | Iterable[_types.Keep] = 0,
     check: bool = True,
     points: bool = False,
     budget: float | None = None,
@@ -1259,7 +1260,7 @@ def reconstruct(
     refine_iterations: int | None = None,
     refine_seconds: float | None = None,
     refine_hold_out: bool = False,
-    refine_backend: Literal["auto", "cpu", "gpu"] = "auto",
+    refine_backend: _types.Backend = "auto",
     names: Iterable[str] | None = None,
     progress: Progress | None = None,
     log: Callable[[LogLevel, str], object] | None = None,
@@ -1271,6 +1272,8 @@ def reconstruct(
     """
     images, cameras = listed(images, "images", 3), listed(cameras, "cameras")
     n = len(images)
+    if n == 0:
+        raise bad_value("images", "none", "at least one")
     columns: dict[str, list[Any]] = {
         "cameras": cameras,
         "masks": [None] * n if masks is None else listed(masks, "masks", 2),
@@ -1415,7 +1418,7 @@ def _choice(choices: type[enum.IntEnum], argument: str, name: str) -> int:
     return int(member)
 
 
-def _kept(keep: Keep | int | str | Iterable[str]) -> int:
+def _kept(keep: Keep | int | _types.Keep | Iterable[_types.Keep]) -> int:
     """Bits of Keep; also by the words of vehicle_gaussians.reconstruct."""
     if isinstance(keep, int):
         return whole(keep, "keep", 0, int(~Keep(0)), "bits of Keep, 0 to 31")
@@ -1461,7 +1464,7 @@ def _mask(array: npt.NDArray[Any], argument: str, alive: list[Any]) -> vg_image:
     return _plane(array, argument, Format.GRAY8, alive)
 
 
-def _depth(array: npt.NDArray[Any], argument: str, alive: list[Any]) -> vg_image:
+def _depth(array: _types.Floats, argument: str, alive: list[Any]) -> vg_image:
     allowed = "an array of floats, metres, (height, width); millimetres become one by depth.astype(np.float32) / 1000"
     return _plane(floats(array, argument, allowed), argument, Format.DEPTH32F, alive)
 
@@ -1555,7 +1558,7 @@ def view_errors(
     image: npt.NDArray[np.uint8],
     mask: npt.NDArray[Any] | None,
     camera: Camera,
-    depth: npt.NDArray[np.float32] | None = None,
+    depth: _types.Floats | None = None,
     *,
     lpips: Model | None = None,
     context: Context | None = None,
@@ -1575,7 +1578,7 @@ def view_errors(
 
 
 def surface_errors(
-    gaussians: Gaussians, points: npt.NDArray[np.float32], *, f_score: float = 0.05, context: Context | None = None
+    gaussians: Gaussians, points: _types.Floats, *, f_score: float = 0.05, context: Context | None = None
 ) -> SurfaceErrors:
     """The error of a model's surface against points measured on the vehicle: float32 (n, 3), metres, its frame.
 
@@ -1589,7 +1592,7 @@ def surface_errors(
     return SurfaceErrors(*_measures(errors))  # type: ignore[arg-type]
 
 
-def _align_options(heading: str, context: Context | None) -> vg_align_options:
+def _align_options(heading: _types.Heading, context: Context | None) -> vg_align_options:
     options: vg_align_options = _initial(vg_align_options)
     options.context = _lent_context(context)
     options.heading = _choice(Heading, "heading", heading)
@@ -1631,10 +1634,10 @@ def _points(points: npt.ArrayLike | None, argument: str) -> npt.NDArray[np.float
 def align_scan(
     masks: Sequence[npt.NDArray[Any] | None],
     cameras: Sequence[Camera],
-    scan: npt.NDArray[np.float32],
+    scan: _types.Floats,
     sparse: npt.ArrayLike | None = None,
     *,
-    heading: str = "auto",
+    heading: _types.Heading = "auto",
     names: Sequence[str] | None = None,
     progress: Progress | None = None,
     context: Context | None = None,
@@ -1656,7 +1659,7 @@ def align_box(
     sparse: npt.ArrayLike,
     size: npt.ArrayLike,
     *,
-    heading: str,
+    heading: Literal["forward", "backward"],
     names: Sequence[str] | None = None,
     progress: Progress | None = None,
     context: Context | None = None,
@@ -1688,7 +1691,7 @@ def align_folder(
     path: str | os.PathLike[str],
     scan: str | os.PathLike[str] | None = None,
     *,
-    heading: str = "auto",
+    heading: _types.Heading = "auto",
     progress: Progress | None = None,
     context: Context | None = None,
 ) -> Alignment:
@@ -1718,7 +1721,7 @@ class Scene(NamedTuple):
 
 def open_scene(
     path: str | os.PathLike[str],
-    views: Iterable[str] | None = None,
+    views: str | Iterable[str] | None = None,
     vehicle_from_world: npt.ArrayLike | None = None,
     *,
     depth_scale: float | None = None,
