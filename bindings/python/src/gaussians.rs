@@ -154,7 +154,7 @@ impl Gaussians {
     /// Those whose centre lies in the box from low to high, three numbers each, metres, its faces included. Infinite sides
     /// are open.
     ///
-    ///     >>> front = car.cropped((0, -inf, -inf), (inf, inf, inf))
+    ///     >>> front = car.cropped((0, -10, -10), (10, 10, 10))
     #[pyo3(signature = (low, high))]
     fn cropped(&self, low: &Bound<'_, PyAny>, high: &Bound<'_, PyAny>) -> PyResult<Self> {
         let py = low.py();

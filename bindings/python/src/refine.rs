@@ -8,7 +8,7 @@ use crate::watched::Teller;
 use crate::whole;
 use pyo3::prelude::*;
 use vg::progress::Progress;
-use vg::refine::{self, Amount, Densify, RefineOptions};
+use vg::refine::{Amount, Densify, RefineOptions};
 
 /// The Gaussians, and what was done as JSON.
 #[pyfunction]
@@ -58,7 +58,7 @@ pub(crate) fn refine(
     let mut raised = None;
     let made = detached(py, || {
         let mut tell = |state: Progress| teller.tell(state, &mut raised);
-        let (refined, done) = refine::model(gaussians, &scene, &options, threads, &mut tell)?;
+        let (refined, done) = vg::refine::model(gaussians, &scene, &options, threads, &mut tell)?;
         Ok((refined, serde_json::to_string(&done).unwrap_or_default()))
     });
     if let Some(error) = raised {

@@ -8,7 +8,6 @@ import sys
 import warnings
 from typing import Any
 
-import numpy as np
 import pytest
 
 import vehicle_gaussians as vg
@@ -20,32 +19,26 @@ FACES: list[Any] = [vg, capi]
 
 @pytest.mark.parametrize("face", FACES)
 def test_depth_that_one_view_lacks_bends_the_shape_and_warns_of_the_callers_line(
-    face: Any, sedan: vg.Scene, caplog: pytest.LogCaptureFixture
+    face: Any, ellipsoid: Views, caplog: pytest.LogCaptureFixture
 ) -> None:
-    small = [camera.scaled(128, 96) for camera in sedan.cameras]
-    images, masks = ([plane[::5, ::5][:96, :128] for plane in planes] for planes in (sedan.images, sedan.masks))
-    depths = [depth[::5, ::5][:96, :128] for depth in sedan.depths]
-    if images[0].shape[:2] != (96, 128):
-        pytest.skip("the sample has another size")
-    views = (images, masks, small)
+    views = (ellipsoid.images, ellipsoid.masks, ellipsoid.cameras)
+    some = [*ellipsoid.depths[:3], None]
     with pytest.warns(vg.VgWarning, match="^depth: 1 of 4 views have none: .* measured points") as caught:
-        made = face.reconstruct(*views, [*depths[:3], None], check=False)
+        made = face.reconstruct(*views, some, check=False)
     assert [warning.filename for warning in caught] == [__file__]
     assert "depth: 1 of 4 views have none" in caplog.text
     assert made.report["prior"] == "shape" and made.report["cloud"]["used"] > 1000
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         without = face.reconstruct(*views, [None] * 4, check=False)
-        given = face.reconstruct(*views, depths, check=False)
-        asked = face.reconstruct(*views, [*depths[:3], None], prior="shape", check=False)
-    assert without.report["cloud"] is None and given.report["prior"] == "given"
+        asked = face.reconstruct(*views, some, prior="shape", check=False)
+    assert without.report["cloud"] is None
     # Who asks for the shape alone gets it.
     assert asked.gaussians.means.tobytes() == without.gaussians.means.tobytes()
-    errors = [
-        face.view_errors(model.gaussians, images[0], masks[0], small[0], depths[0]).depth_mae_m
-        for model in (given, made, without)
-    ]
-    assert errors[0] < errors[1] < 0.9 * errors[2], errors
+    # The view without depth is the better for that of the others.
+    last = (ellipsoid.images[3], ellipsoid.masks[3], ellipsoid.cameras[3], ellipsoid.depths[3])
+    errors = [face.view_errors(model.gaussians, *last).depth_mae_m for model in (made, without)]
+    assert errors[0] < 0.7 * errors[1], errors
 
 
 @pytest.mark.parametrize("face", FACES)
@@ -67,17 +60,6 @@ def test_the_logger_is_told_what_was_done(face: Any, ellipsoid: Views, caplog: p
     assert len(by_level[logging.DEBUG]) == len(made.report["stages"])
     assert by_level[logging.INFO][-1].startswith(f"{len(made.gaussians)} Gaussians from depth prior hull in ")
     assert any("left out" in text and "averaged into fewer" in text for text in by_level[logging.INFO])
-
-
-@pytest.mark.parametrize("face", FACES)
-def test_what_looks_like_a_mistake_warns_and_is_logged(
-    face: Any, ellipsoid: Views, caplog: pytest.LogCaptureFixture
-) -> None:
-    ones = [mask.astype(np.uint8) for mask in ellipsoid.masks]
-    with pytest.warns(vg.VgWarning, match=r"^masks\[0\]: the largest value is 1") as caught, pytest.raises(vg.VgError):
-        face.reconstruct(ellipsoid.images, ones, ellipsoid.cameras)
-    assert {warning.filename for warning in caught} == {__file__}
-    assert "masks[0]: the largest value is 1" in caplog.text
 
 
 def test_without_a_handler_a_warning_is_printed_once() -> None:

@@ -79,50 +79,83 @@ class Camera:
             >>> camera = Camera.from_matrix([[600, 0, 320], [0, 600, 240], [0, 0, 1]], vehicle_from_camera, 640, 480)
         """
     @staticmethod
-    @overload
     def from_opencv(
         K: npt.ArrayLike,
-        vehicle_from_camera: npt.ArrayLike,
-        width: int,
-        height: int,
+        vehicle_from_camera: npt.ArrayLike | None = None,
+        width: SupportsIndex = 0,
+        height: SupportsIndex = 0,
         distortion: npt.ArrayLike | None = None,
         *,
         fisheye: bool = False,
-    ) -> Camera: ...
-    @staticmethod
-    @overload
-    def from_opencv(
-        K: npt.ArrayLike,
-        vehicle_from_camera: None = None,
-        width: int = 0,
-        height: int = 0,
-        distortion: npt.ArrayLike | None = None,
-        *,
-        fisheye: bool = False,
-        rvec: npt.ArrayLike,
-        tvec: npt.ArrayLike,
+        rvec: npt.ArrayLike | None = None,
+        tvec: npt.ArrayLike | None = None,
         vehicle_from_world: npt.ArrayLike | None = None,
-    ) -> Camera: ...
+    ) -> Camera:
+        """From OpenCV's calibration, which puts the centre of the top-left pixel at (0, 0): half a pixel is added to the
+        principal point.
+
+        distortion is that of cv2.calibrateCamera or, with fisheye=True, of cv2.fisheye. Instead of the pose, rvec and tvec
+        as cv2.solvePnP and cv2.calibrateCamera return them, from the world of the object's points; without
+        vehicle_from_world, a 4x4 similarity, that world is the vehicle's frame.
+
+            >>> K = [[600, 0, 319.5], [0, 600, 239.5], [0, 0, 1]]
+            >>> camera = Camera.from_opencv(K, vehicle_from_camera, 640, 480)
+            >>> float(camera.K[0, 2])
+            320.0
+            >>> rvec, tvec = [0.0, 0.0, 1.5], [0.0, 0.5, 6.0]
+            >>> camera = Camera.from_opencv(K, width=640, height=480, distortion=[-0.1, 0, 0, 0], rvec=rvec, tvec=tvec)
+        """
     @staticmethod
     def look_at(
         eye: npt.ArrayLike,
         target: npt.ArrayLike,
-        width: int,
-        height: int,
+        width: SupportsIndex,
+        height: SupportsIndex,
         *,
         fov_y_degrees: float = 35.0,
         up: npt.ArrayLike = (0.0, 0.0, 1.0),
-    ) -> Camera: ...
+    ) -> Camera:
+        """A pinhole camera at eye, a point of the vehicle's frame in metres, whose optical axis meets target. Its picture
+        shows fov_y_degrees from top to bottom, and up is up in it. For another lens: with_pose.
+
+            >>> camera = Camera.look_at((6, -4, 1.5), (0, 0, 0.7), 640, 480)
+            >>> camera.project([[0, 0, 0.7]]).round(6)
+            array([[320., 240.]])
+        """
     @overload
-    def project(self, points: npt.ArrayLike, depth: Literal[False] = False) -> npt.NDArray[np.float64]: ...
+    def project(self, points: npt.ArrayLike, depth: Literal[False] = False) -> npt.NDArray[np.float64]:
+        """The pixels (n, 2), column and row, of points (n, 3) of the vehicle's frame, metres; with depth=True a pair of them
+        and the depths (n,) along the optical axis, metres. NaN where the camera has no picture of a point: behind it, and
+        beyond the angle at which its lens folds back. The centre of the top-left pixel is (0.5, 0.5); pixels outside 0 to
+        width and 0 to height lie beside the picture.
+
+            >>> pixels, depths = camera.project(car.means, depth=True)
+        """
     @overload
     def project(
         self, points: npt.ArrayLike, depth: Literal[True]
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
-    def unproject(self, pixels: npt.ArrayLike, depths: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
-    def scaled(self, width: SupportsIndex, height: SupportsIndex) -> Camera: ...
-    def cropped(self, x: SupportsIndex, y: SupportsIndex, width: SupportsIndex, height: SupportsIndex) -> Camera: ...
-    def with_pose(self, vehicle_from_camera: npt.ArrayLike) -> Camera: ...
+    def unproject(self, pixels: npt.ArrayLike, depths: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """The points (n, 3) of the vehicle's frame, metres, behind pixels (n, 2), column and row, at depths (n,) along the
+        optical axis, metres. NaN where a depth is no measurement (0, negative, NaN), and where the lens has no ray.
+
+            >>> point = camera.unproject([[320.0, 240.0]], [6.0])
+        """
+    def scaled(self, width: SupportsIndex, height: SupportsIndex) -> Camera:
+        """The same camera for pictures resized to width x height.
+
+        >>> half = camera.scaled(camera.width // 2, camera.height // 2)
+        """
+    def cropped(self, x: SupportsIndex, y: SupportsIndex, width: SupportsIndex, height: SupportsIndex) -> Camera:
+        """The camera of the part image[y : y + height, x : x + width] of its pictures.
+
+        >>> part = camera.cropped(x=100, y=50, width=64, height=32)  # of image[50:82, 100:164]
+        """
+    def with_pose(self, vehicle_from_camera: npt.ArrayLike) -> Camera:
+        """The same camera, lens included, in another place.
+
+        >>> moved = camera.with_pose(other_vehicle_from_camera)
+        """
     @property
     def width(self) -> int:
         """Columns."""
@@ -190,7 +223,12 @@ class Renderer:
         far: float = 1e10,
         sh_degree: int = 3,
         progress: Progress | None = None,
-    ) -> list[npt.NDArray[np.uint8]]: ...
+    ) -> list[npt.NDArray[np.uint8]]:
+        """The pictures of several cameras, a list of what render gives. A graphics processor draws one while the picture
+        before it is copied. progress is as for reconstruct, with the one stage "render".
+
+            >>> pictures = Renderer(car).render_many(cameras)
+        """
 
 @final
 class Gaussians:
@@ -213,28 +251,75 @@ class Gaussians:
             Gaussians(2, sh_degree=0)
         """
     @staticmethod
-    def load_ply(path: str | PathLike[str]) -> Gaussians: ...
-    def save_ply(self, path: str | PathLike[str]) -> None: ...
+    def load_ply(path: str | PathLike[str]) -> Gaussians:
+        """Reads a PLY file in the layout of 3D Gaussian Splatting.
+
+        >>> car = Gaussians.load_ply("car.ply")
+        """
+    def save_ply(self, path: str | PathLike[str]) -> None:
+        """Writes a PLY file in the layout of 3D Gaussian Splatting. A file that is there is replaced only once the new
+        one is complete.
+
+            >>> car.save_ply("copy.ply")
+        """
     @staticmethod
-    def from_ply_bytes(data: bytes | bytearray | memoryview) -> Gaussians: ...
-    def to_ply_bytes(self) -> bytes: ...
+    def from_ply_bytes(data: bytes | bytearray | memoryview) -> Gaussians:
+        """From the bytes of a PLY file in the layout of 3D Gaussian Splatting.
+
+        >>> same = Gaussians.from_ply_bytes(car.to_ply_bytes())
+        """
+    def to_ply_bytes(self) -> bytes:
+        """What save_ply writes, as bytes.
+
+        >>> car.to_ply_bytes()[:4]
+        b'ply\n'
+        """
     def __getitem__(
         self, index: slice | Sequence[int] | Sequence[bool] | npt.NDArray[np.integer[Any] | np.bool_], /
     ) -> Gaussians: ...
-    def cropped(self, low: npt.ArrayLike, high: npt.ArrayLike) -> Gaussians: ...
-    def covariances(self) -> npt.NDArray[np.float32]: ...
+    def cropped(self, low: npt.ArrayLike, high: npt.ArrayLike) -> Gaussians:
+        """Those whose centre lies in the box from low to high, three numbers each, metres, its faces included. Infinite sides
+        are open.
+
+            >>> front = car.cropped((0, -10, -10), (10, 10, 10))
+        """
+    def covariances(self) -> npt.NDArray[np.float32]:
+        """Covariance matrices in the vehicle's frame, square metres. (n, 3, 3)
+
+        >>> volumes = np.sqrt(np.linalg.det(car.covariances()))
+        """
     def turntable(
         self,
-        count: int,
-        width: int,
-        height: int,
+        count: SupportsIndex,
+        width: SupportsIndex,
+        height: SupportsIndex,
         *,
         elevation_degrees: float = 12.0,
         fov_y_degrees: float = 35.0,
-    ) -> list[Camera]: ...
-    def mirrored(self) -> Gaussians: ...
-    def transformed(self, to_from_vehicle: npt.ArrayLike) -> Gaussians: ...
-    def merged(self, other: Gaussians) -> Gaussians: ...
+    ) -> list[Camera]:
+        """count cameras on a circle around the vehicle, from its front towards its left, each with all of it in its picture.
+
+        >>> pictures = Renderer(car).render_many(car.turntable(36, 320, 240))
+        """
+    def mirrored(self) -> Gaussians:
+        """The mirror image across the plane of symmetry, y = 0.
+
+        >>> car.mirrored().mirrored() == car
+        True
+        """
+    def transformed(self, to_from_vehicle: npt.ArrayLike) -> Gaussians:
+        """These in another frame: to_from_vehicle is a 4x4 similarity. Colours turn with the vehicle. Coordinates must stay
+        below 16384 m, where a float32 still holds a millimetre.
+
+            >>> twice_as_large = car.transformed(np.diag([2.0, 2.0, 2.0, 1.0]))
+        """
+    def merged(self, other: Gaussians) -> Gaussians:
+        """These, then those of other, at the higher of their degrees of spherical harmonics.
+
+        >>> both = car.merged(car.mirrored())
+        >>> len(both) == 2 * len(car)
+        True
+        """
     @overload
     def render(
         self,
@@ -462,10 +547,23 @@ def pose_from_colmap(
     qvec: npt.ArrayLike,
     tvec: npt.ArrayLike,
     vehicle_from_world: npt.ArrayLike | None = None,
-) -> npt.NDArray[np.float64]: ...
+) -> npt.NDArray[np.float64]:
+    """vehicle_from_camera (4x4) of COLMAP's world-to-camera quaternion (w, x, y, z) and translation.
+
+    vehicle_from_world is the similarity (4x4) from the model's world to the vehicle's frame; without, they are one.
+    pycolmap keeps quaternions as (x, y, z, w).
+
+        >>> vehicle_from_camera = pose_from_colmap([1, 0, 0, 0], [0, 0, 5], vehicle_from_world)
+    """
 def pose_from_opencv(
     rvec: npt.ArrayLike, tvec: npt.ArrayLike, vehicle_from_world: npt.ArrayLike | None = None
-) -> npt.NDArray[np.float64]: ...
+) -> npt.NDArray[np.float64]:
+    """vehicle_from_camera (4x4) of OpenCV's world-to-camera rotation vector and translation, as cv2.solvePnP returns them.
+
+    vehicle_from_world is the similarity (4x4) from that world to the vehicle's frame; without, they are one.
+
+        >>> vehicle_from_camera = pose_from_opencv([0.0, 0.0, 1.5], [0.0, 0.5, 6.0])
+    """
 def pose_from_opengl(
     camera_to_world: npt.ArrayLike,
     vehicle_from_world: npt.ArrayLike | None = None,

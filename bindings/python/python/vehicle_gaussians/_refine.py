@@ -54,9 +54,19 @@ def refine(
 
     >>> better = refine(car, scene, iterations=5).gaussians
     """
-    columns = {"images": scene.images, "masks": scene.masks, "cameras": scene.cameras, "depths": scene.depths}
-    lists = [listed(column, name) for name, column in columns.items()]
-    names = listed(scene.names, "names")
-    how = (iterations, seconds, hold_out, densify, backend, threads, progress)
-    refined, report = _native.refine(gaussians, *lists, names, *how)
+    refined, report = _native.refine(
+        gaussians,
+        listed(scene.images, "images", 3),
+        listed(scene.masks, "masks", 2),
+        listed(scene.cameras, "cameras"),
+        listed(scene.depths, "depths", 2),
+        listed(scene.names, "names"),
+        iterations,
+        seconds,
+        hold_out,
+        densify,
+        backend,
+        threads,
+        progress,
+    )
     return Refined(refined, json.loads(report))
