@@ -5,23 +5,14 @@
 // FOLDER is a nerfstudio scene: transforms.json, photographs, masks, and depth where it was measured. Views
 // from the right of the vehicle (y < 0) are used; for those from the left, OUT_FOLDER/<name>.png is drawn.
 #include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <vector>
 
 #include <opencv2/core.hpp>
 #include <opencv2/highgui.hpp>
 #include <opencv2/imgcodecs.hpp>
+#define VG_HPP_EXCEPTIONS // take() of what failed throws; colmap_vehicle.cpp does without
 #include <vg.hpp>
-
-// A value, or the end of the program.
-template <class T> T must(vg::Result<T> result) {
-    if (!result) {
-        std::fprintf(stderr, "opencv_onesided: %s\n", result.error().message.c_str());
-        std::exit(1);
-    }
-    return result.take();
-}
 
 struct Frame {
     std::string image, mask, depth;
@@ -43,16 +34,17 @@ static std::vector<Frame> read_frames(const std::string &folder) {
         frame.image = node["file_path"].string();
         frame.mask = node["mask_path"].string();
         frame.depth = node["depth_file_path"].empty() ? "" : node["depth_file_path"].string();
-        frame.camera = must(vg::pinhole(node["fl_x"].real(), node["fl_y"].real(), node["cx"].real(),
-                                        node["cy"].real(), static_cast<std::uint32_t>(node["w"].real()),
-                                        static_cast<std::uint32_t>(node["h"].real()),
-                                        must(vg::pose_from_opengl(camera_to_world))));
+        const vg::Pose pose = vg::pose_from_opengl(camera_to_world).take();
+        frame.camera = vg::pinhole(node["fl_x"].real(), node["fl_y"].real(), node["cx"].real(),
+                                   node["cy"].real(), static_cast<std::uint32_t>(node["w"].real()),
+                                   static_cast<std::uint32_t>(node["h"].real()), pose)
+                           .take();
         frames.push_back(frame);
     }
     return frames;
 }
 
-int main(int argc, char **argv) {
+static int run(int argc, char **argv) {
     bool with_depth = true, show = false;
     for (int i = 3; i < argc; i++) {
         with_depth = with_depth && std::string(argv[i]) != "--no-depth";
@@ -77,27 +69,27 @@ int main(int argc, char **argv) {
         const cv::Mat mask = cv::imread(folder + frame.mask, cv::IMREAD_GRAYSCALE);
         kept.insert(kept.end(), {photograph, mask});
         if (with_depth && !frame.depth.empty()) {
-            cv::Mat metres;
-            cv::imread(folder + frame.depth, cv::IMREAD_UNCHANGED).convertTo(metres, CV_32F, 0.001);
-            kept.push_back(metres);
-            views.push_back(must(vg::view(photograph, mask, metres, frame.camera)));
+            // CV_16U, millimetres.
+            const cv::Mat depth = vg::metres(cv::imread(folder + frame.depth, cv::IMREAD_UNCHANGED)).take();
+            kept.push_back(depth);
+            views.push_back(vg::view(photograph, mask, depth, frame.camera).take());
         } else {
-            views.push_back(must(vg::view(photograph, mask, frame.camera)));
+            views.push_back(vg::view(photograph, mask, frame.camera).take());
         }
     }
 
     // One set of threads for all calls.
-    const vg::Context context = must(vg::Context::make());
+    const vg::Context context = vg::Context::make().take();
     vg::Options options;
     options.context = context.get();
-    const vg::Reconstruction made = must(vg::reconstruct(views, options));
+    const vg::Reconstruction made = vg::reconstruct(views, options).take();
     std::printf("%zu Gaussians in %.0f ms\n", made.gaussians.size(), made.report.figures().total_ms);
 
     vg::RenderOptions render_options;
     render_options.context = context.get();
     for (const Frame &frame : unseen) {
         cv::Mat picture; // CV_8UC3, BGR
-        must(vg::render_into(picture, made.gaussians, frame.camera, render_options));
+        vg::render_into(picture, made.gaussians, frame.camera, render_options).take();
         const std::string stem = frame.image.substr(frame.image.find_last_of('/') + 1);
         const std::string path = out_folder + stem.substr(0, stem.find_last_of('.')) + ".png";
         if (!cv::imwrite(path, picture)) {
@@ -111,4 +103,13 @@ int main(int argc, char **argv) {
         }
     }
     return 0;
+}
+
+int main(int argc, char **argv) {
+    try {
+        return run(argc, argv);
+    } catch (const vg::Exception &error) {
+        std::fprintf(stderr, "opencv_onesided: %s\n", error.what());
+        return 1;
+    }
 }

@@ -22,7 +22,8 @@
  * Poses.     Camera to vehicle: p_vehicle = R p_camera + t, as the first three rows [R | t] of a 4x4 matrix, double,
  *            ROW-MAJOR. (Eigen's default is column-major; cv::Mat is row-major.) Quaternions are w, x, y, z.
  *            COLMAP stores world to camera and nerfstudio stores OpenGL axes: vg_pose_from_colmap and
- *            vg_pose_from_opengl convert. A tracked, moving vehicle: vg_pose_from_box.
+ *            vg_pose_from_opengl convert; OpenCV's rvec and tvec: vg_pose_from_opencv. A tracked, moving vehicle:
+ *            vg_pose_from_box. A camera that is placed by hand: vg_pose_look_at.
  *
  * Pixels.    Column u counts right, row v counts down, row 0 is the top row. The centre of the top-left pixel is
  *            (0.5, 0.5), as in COLMAP. OpenCV puts it at (0, 0): vg_camera_from_opencv converts.
@@ -48,7 +49,8 @@
  *
  * Ownership. Whoever receives a handle through an out parameter frees it with the matching _free function, which
  *            accepts NULL. Pointers that a function returns are borrowed: they live as long as the handle they were
- *            asked of. transform, mirror and merge return new handles. No struct owns what it points to.
+ *            asked of. transform, mirror, merge, select, mask and crop return new handles. No struct owns what it
+ *            points to.
  *
  * NULL.      Allowed where a comment says what it means; everywhere else it is an error, never a crash.
  *
@@ -564,6 +566,39 @@ typedef int32_t vg_calibration;
 #endif // __cplusplus
 
 /**
+ * Why a refinement ended.
+ */
+enum vg_refine_stop
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * All steps are done.
+     */
+    VG_REFINE_STOP_DONE = 0,
+    /**
+     * The view that took no part got no better any more.
+     */
+    VG_REFINE_STOP_HELD_OUT = 1,
+    /**
+     * The error grew far beyond where it began; the best of the states before is returned.
+     */
+    VG_REFINE_STOP_DIVERGED = 2,
+    /**
+     * No view sees anything of the model: it is as it was.
+     */
+    VG_REFINE_STOP_UNSEEN = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_refine_stop vg_refine_stop;
+#else
+typedef int32_t vg_refine_stop;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * What draws.
  */
 enum vg_backend
@@ -683,7 +718,7 @@ typedef struct vg_error vg_error;
 
 /**
  * A set of Gaussians. Owned by the caller, who frees it with `vg_gaussians_free`. It never changes: `transform`,
- * `mirror` and `merge` return new ones, and any number of threads may read or render one at a time.
+ * `mirror`, `merge`, `select`, `mask` and `crop` return new ones, and any number of threads may read or render one at a time.
  */
 typedef struct vg_gaussians vg_gaussians;
 
@@ -1177,6 +1212,97 @@ typedef struct vg_gaussian_arrays {
      */
     uint32_t flags;
 } vg_gaussian_arrays;
+
+/**
+ * Settings of `vg_refine`.
+ */
+typedef struct vg_refine_options {
+    /**
+     * `sizeof(vg_refine_options)`.
+     */
+    size_t struct_size;
+    /**
+     * Threads and memory to use. NULL: made for this call, one thread per core.
+     */
+    struct vg_context *context;
+    /**
+     * Seconds the call may take, about, up to 86400: a number of steps is found that fits. 0: as many steps as
+     * `iterations` says. Default 0.
+     */
+    double seconds;
+    /**
+     * Steps, at most 1000000, which the same input answers with the same bytes; not looked at where `seconds` is
+     * above 0. Default 300.
+     */
+    uint32_t iterations;
+    /**
+     * 1: one of three or more views takes no part and tells when to stop; 0: all do. Default 0.
+     */
+    int32_t hold_out;
+    /**
+     * 1: Gaussians divide and go on the way, so that the result has another number of them; 0: they keep their number
+     * and order. Default 0.
+     */
+    int32_t densify;
+    /**
+     * A `vg_backend`: who draws and goes back. Default `VG_BACKEND_AUTO`: what is known to pay, at present the CPU.
+     */
+    int32_t backend;
+    /**
+     * NULL: none.
+     */
+    vg_progress_fn progress;
+    /**
+     * Handed to `progress`.
+     */
+    void *progress_user;
+    /**
+     * Reserved: 0.
+     */
+    uint64_t flags;
+} vg_refine_options;
+
+/**
+ * What a refinement did; NAN where a measure does not exist.
+ */
+typedef struct vg_refinement {
+    /**
+     * `sizeof(vg_refinement)`.
+     */
+    size_t struct_size;
+    /**
+     * Steps that were planned: `vg_refine_options.iterations` of this number does the same again.
+     */
+    uint32_t iterations;
+    /**
+     * Steps that were made.
+     */
+    uint32_t made;
+    /**
+     * Steps that the result has seen; 0 if nothing was better than the beginning.
+     */
+    uint32_t kept;
+    /**
+     * A `vg_refine_stop`.
+     */
+    int32_t stop;
+    /**
+     * Mean PSNR of the views that took part, each in its exposure, before, dB.
+     */
+    double psnr_before_db;
+    /**
+     * The same after.
+     */
+    double psnr_after_db;
+    /**
+     * PSNR of the view that was held out before, dB; NAN without one.
+     */
+    double held_out_before_db;
+    /**
+     * The same after.
+     */
+    double held_out_after_db;
+} vg_refinement;
 
 /**
  * Settings of `vg_render`.
@@ -1721,6 +1847,13 @@ VG_API
 uint32_t vg_abi_version(void);
 
 /**
+ * The name of a `vg_status`: `VG_STATUS_ARGUMENT` for 1. A number that this library does not know: an empty string. Never
+ * NULL; lives for ever.
+ */
+VG_API
+const char *vg_status_name(int32_t status);
+
+/**
  * The status of the call that made this error. NULL: `VG_STATUS_OK`.
  */
 VG_API
@@ -1880,6 +2013,24 @@ vg_status vg_pose_from_opengl(const double *camera_to_world,
                               struct vg_error **out_error);
 
 /**
+ * A pose from OpenCV's `cv::solvePnP`, `cv::calibrateCamera` or ArUco: world to camera. With `vg_camera_from_opencv` it
+ * makes a whole camera.
+ *
+ * - rvec: 3 numbers, a rotation vector: its direction is the axis, its length the angle in radians.
+ * - tvec: 3 numbers.
+ * - vehicle_from_world: 16 numbers, as in `vg_pose_from_colmap`. NULL: the world, where the object's points were
+ *   measured, is the vehicle's frame.
+ * - out: receives 12 numbers, camera to vehicle, as in `vg_camera`; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_pose_from_opencv(const double *rvec,
+                              const double *tvec,
+                              const double *vehicle_from_world,
+                              double *out,
+                              struct vg_error **out_error);
+
+/**
  * A pose from a tracked box: where the vehicle and the camera are in any common frame (ego, map, UTM) at the
  * moment of the picture. The vehicle may move between pictures. Camera axes x right, y down, z forward; box axes
  * x forward, y left, z up, its origin on the vehicle's plane of symmetry.
@@ -1896,12 +2047,13 @@ vg_status vg_pose_from_box(const double *vehicle_in_ego,
                            struct vg_error **out_error);
 
 /**
- * The pixel of a point.
+ * The pixel of a point. For many points, `vg_camera_project_points`.
  *
  * - camera: is not changed.
  * - point_vehicle: 3 numbers, metres, vehicle frame.
  * - out_pixel: receives 2 numbers, column and row; a picture's pixels are 0 to width and 0 to height. Unchanged on
- *   failure, and where the point lies on or behind the camera's plane, which is `VG_STATUS_ARGUMENT`.
+ *   failure, and where the camera has no picture of the point, which is `VG_STATUS_ARGUMENT`: on or behind its plane, and
+ *   beyond the angle at which its lens model folds back.
  * - out_error: NULL, or receives the error.
  */
 VG_API
@@ -2141,6 +2293,211 @@ VG_API
 void vg_gaussians_free(struct vg_gaussians *gaussians);
 
 /**
+ * The Gaussians at these indices, in this order; an index may come again.
+ *
+ * - gaussians: not NULL; they stay as they are.
+ * - indices, index_count: each below `vg_gaussians_count`. NULL with 0.
+ * - out: receives the Gaussians; the caller frees them. NULL on failure.
+ * - out_error: NULL, or receives the error, which names the index.
+ */
+VG_API
+vg_status vg_gaussians_select(const struct vg_gaussians *gaussians,
+                              const size_t *indices,
+                              size_t index_count,
+                              struct vg_gaussians **out,
+                              struct vg_error **out_error);
+
+/**
+ * The Gaussians whose byte is not 0, in order: by opacity, by size, by whatever the caller computed of the arrays.
+ *
+ * - gaussians: not NULL; they stay as they are.
+ * - keep, keep_count: one byte per Gaussian, `vg_gaussians_count` of them. NULL with 0.
+ * - out: receives the Gaussians; the caller frees them. NULL on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_gaussians_mask(const struct vg_gaussians *gaussians,
+                            const uint8_t *keep,
+                            size_t keep_count,
+                            struct vg_gaussians **out,
+                            struct vg_error **out_error);
+
+/**
+ * The Gaussians whose centre lies in a box, its faces included, in order.
+ *
+ * - gaussians: not NULL; they stay as they are.
+ * - low, high: 3 numbers each, metres, in the Gaussians' frame; `low` not above `high`. Infinite sides are open.
+ * - out: receives the Gaussians; the caller frees them. NULL on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_gaussians_crop(const struct vg_gaussians *gaussians,
+                            const double *low,
+                            const double *high,
+                            struct vg_gaussians **out,
+                            struct vg_error **out_error);
+
+/**
+ * Covariance matrices R diag(scale^2) R^T, square metres: xx, xy, xz, yy, yz, zz of each, as 3D Gaussian Splatting orders
+ * them.
+ *
+ * - gaussians: not NULL.
+ * - out: float32 `[count][6]`; unchanged on failure. NULL with 0.
+ * - count: `vg_gaussians_count`.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_gaussians_covariances(const struct vg_gaussians *gaussians,
+                                   float *out,
+                                   size_t count,
+                                   struct vg_error **out_error);
+
+/**
+ * `vg_gaussians_load_ply` of a file that is in memory.
+ *
+ * - data, size: the bytes of the file; not kept. NULL with 0.
+ * - out: receives the Gaussians; the caller frees them. NULL on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_gaussians_load_ply_memory(const void *data,
+                                       size_t size,
+                                       struct vg_gaussians **out,
+                                       struct vg_error **out_error);
+
+/**
+ * How many bytes `vg_gaussians_save_ply_memory` writes. NULL: 0.
+ */
+VG_API
+size_t vg_gaussians_ply_size(const struct vg_gaussians *gaussians);
+
+/**
+ * `vg_gaussians_save_ply` into memory of the caller's.
+ *
+ * - gaussians: not NULL.
+ * - buffer: receives the bytes of the file, `vg_gaussians_ply_size` of them; unchanged on failure.
+ * - size: how many bytes there is room for.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_gaussians_save_ply_memory(const struct vg_gaussians *gaussians,
+                                       void *buffer,
+                                       size_t size,
+                                       struct vg_error **out_error);
+
+/**
+ * A camera's pose by where it stands and what it looks at.
+ *
+ * - eye: 3 numbers, where the camera stands, metres, vehicle frame.
+ * - target: 3 numbers, a point on its optical axis; not `eye`.
+ * - up: 3 numbers, the direction that is up in the picture, of any length; not along the line of sight. NULL: the
+ *   vehicle's z axis.
+ * - out: receives 12 numbers, camera to vehicle, as in `vg_camera`; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_pose_look_at(const double *eye,
+                          const double *target,
+                          const double *up,
+                          double *out,
+                          struct vg_error **out_error);
+
+/**
+ * A pinhole camera by where it stands and what it looks at. For another lens, hand the pose of `vg_pose_look_at` to the
+ * function that makes its camera.
+ *
+ * - eye, target, up: as in `vg_pose_look_at`.
+ * - fov_y_degrees: angle from the top to the bottom of the picture, above 0 and below 180. Pixels are square.
+ * - width, height: 1 to 8192.
+ * - out: receives the whole camera, `struct_size` included; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_camera_look_at(const double *eye,
+                            const double *target,
+                            const double *up,
+                            double fov_y_degrees,
+                            uint32_t width,
+                            uint32_t height,
+                            struct vg_camera *out,
+                            struct vg_error **out_error);
+
+/**
+ * Cameras on a circle around Gaussians, from the vehicle's front towards its left, each with all of their centres in
+ * its picture.
+ *
+ * - gaussians: at least one.
+ * - count: how many cameras, 1 to 100000.
+ * - elevation_degrees: angle by which they look down, -89 to 89; the program takes 12.
+ * - fov_y_degrees: vertical field of view, above 0 and below 180; the program takes 35.
+ * - width, height: 1 to 8192.
+ * - out: an array that receives `count` whole cameras, `struct_size` included; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_cameras_turntable(const struct vg_gaussians *gaussians,
+                               size_t count,
+                               double elevation_degrees,
+                               double fov_y_degrees,
+                               uint32_t width,
+                               uint32_t height,
+                               struct vg_camera *out,
+                               struct vg_error **out_error);
+
+/**
+ * The pixels of many points: `vg_camera_project` for an array, where points without a pixel are no error.
+ *
+ * - camera: is not changed.
+ * - points: double `[count][3]` without gaps, metres, vehicle frame. NULL with 0.
+ * - out_pixels: double `[count][2]`, column and row; NAN where the camera has no picture of the point: on or behind its
+ *   plane, and beyond the angle at which its lens model folds back. Pixels outside 0 to width and 0 to height lie beside
+ *   the picture.
+ * - out_depths: double `[count]`, planar depth, metres, NAN where there is no pixel. NULL: not wanted.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_camera_project_points(const struct vg_camera *camera,
+                                   const double *points,
+                                   size_t count,
+                                   double *out_pixels,
+                                   double *out_depths,
+                                   struct vg_error **out_error);
+
+/**
+ * The point behind a pixel.
+ *
+ * - camera: is not changed.
+ * - pixel: 2 numbers, column and row; the centre of the top-left pixel is (0.5, 0.5).
+ * - depth_m: planar depth, metres along the optical axis, above 0.
+ * - out_point: receives 3 numbers, metres, vehicle frame. Unchanged on failure, and where the lens has no ray to the
+ *   pixel, which is `VG_STATUS_ARGUMENT`.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_camera_unproject(const struct vg_camera *camera,
+                              const double *pixel,
+                              double depth_m,
+                              double *out_point,
+                              struct vg_error **out_error);
+
+/**
+ * The points behind many pixels: `vg_camera_unproject` for an array, where pixels without a point are no error.
+ *
+ * - camera: is not changed.
+ * - pixels: double `[count][2]` without gaps, column and row. NULL with 0.
+ * - depths: double `[count]`, planar depth, metres; 0, negative, NAN and infinite mean no measurement. NULL with 0.
+ * - out_points: double `[count][3]`, metres, vehicle frame; NAN where there is no measurement or no ray.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_camera_unproject_points(const struct vg_camera *camera,
+                                     const double *pixels,
+                                     const double *depths,
+                                     size_t count,
+                                     double *out_points,
+                                     struct vg_error **out_error);
+
+/**
  * Makes a complete vehicle of photographs of one side.
  *
  * - views, view_count: 1 to 4096 views; nothing they point to is changed, or looked at after the call.
@@ -2158,6 +2515,40 @@ vg_status vg_reconstruct(const struct vg_view *views,
                          struct vg_gaussians **out_gaussians,
                          struct vg_report **out_report,
                          struct vg_error **out_error);
+
+/**
+ * Sets `*options` to the default values. `size`: `sizeof *options`.
+ */
+VG_API
+vg_status vg_refine_options_init(struct vg_refine_options *options,
+                                 size_t size);
+
+/**
+ * Sets `*refinement` to no steps and NAN. `size`: `sizeof *refinement`.
+ */
+VG_API
+vg_status vg_refinement_init(struct vg_refinement *refinement,
+                             size_t size);
+
+/**
+ * Moves the Gaussians of any model until their pictures are the photographs. Nothing is known of which mirrors which:
+ * each goes its own way. `vg_reconstruct` with `refine_iterations` keeps both sides mirror images.
+ *
+ * - gaussians: at least one, in the views' vehicle frame; they stay as they are.
+ * - views, view_count: 1 to 4096 views, as for `vg_reconstruct`.
+ * - options: NULL for the default values.
+ * - out: receives the Gaussians; the caller frees them. NULL on failure.
+ * - out_refinement: NULL, or a struct that `vg_refinement_init` was called for; unchanged on failure.
+ * - out_error: NULL, or receives the error.
+ */
+VG_API
+vg_status vg_refine(const struct vg_gaussians *gaussians,
+                    const struct vg_view *views,
+                    size_t view_count,
+                    const struct vg_refine_options *options,
+                    struct vg_gaussians **out,
+                    struct vg_refinement *out_refinement,
+                    struct vg_error **out_error);
 
 /**
  * Sets `*options` to the default values. `size`: `sizeof *options`.

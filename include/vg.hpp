@@ -2,31 +2,67 @@
  * vg.hpp - the functions of vg.h for C++17: handles that free themselves, results instead of out parameters,
  * cv::Mat and Eigen where they are there. License: MIT or Apache-2.0.
  *
- *     std::vector<vg_view> views;
- *     views.push_back(vg::view(photograph, mask, camera).take());      // cv::Mat, cv::Mat, vg_camera
- *     auto made = vg::reconstruct(views);
- *     if (!made) {
- *         std::fprintf(stderr, "%s\n", made.error().message.c_str());
+ *     #include <vg.hpp>
+ *     #include <cstdio>
+ *
+ *     int failed(const vg::Error &error) {
+ *         std::fprintf(stderr, "%s: %s\n", vg::status_name(error.status), error.message.c_str());
  *         return 1;
  *     }
- *     cv::Mat picture;
- *     vg::render_into(picture, made->gaussians, other_camera).take();
+ *
+ *     int main(int, char **argv) {
+ *         const auto scene = vg::Scene::open_transforms(argv[1]); // or photographs in memory: vg::view
+ *         if (!scene) {
+ *             return failed(scene.error());
+ *         }
+ *         const auto views = scene->views();
+ *         if (!views) {
+ *             return failed(views.error());
+ *         }
+ *         const auto made = vg::reconstruct(*views);
+ *         if (!made) {
+ *             return failed(made.error());
+ *         }
+ *         const auto saved = made->gaussians.save_ply("car.ply");
+ *         return saved ? 0 : failed(saved.error());
+ *     }
+ *
+ * The same with exceptions:
+ *
+ *     #define VG_HPP_EXCEPTIONS
+ *     #include <vg.hpp>
+ *     #include <cstdio>
+ *
+ *     int main(int, char **argv) {
+ *         try {
+ *             const vg::Scene scene = vg::Scene::open_transforms(argv[1]).take();
+ *             const vg::Reconstruction made = vg::reconstruct(scene.views().take()).take();
+ *             made.gaussians.save_ply("car.ply").take();
+ *         } catch (const vg::Exception &error) {
+ *             std::fprintf(stderr, "%s: %s\n", vg::status_name(error.status()), error.what());
+ *             return 1;
+ *         }
+ *     }
  *
  * The chapter CONVENTIONS of vg.h holds for all of this: frames, poses, pixels, images, threads. What this
  * file adds:
  *
  * Results.   Functions that can fail return a Result, which holds either the value or an Error and may not be
- *            ignored. take() and value() of a Result that holds an Error end the program with its message.
- *            Nothing here throws or needs exceptions or run-time type information; std::vector and
- *            std::string may throw std::bad_alloc where exceptions are on.
+ *            ignored. Check it before the value is used, or say by value_or what to take instead. take(), value(),
+ *            * and -> of a Result that holds an Error print its message and end the program; with
+ *            VG_HPP_EXCEPTIONS, defined before this file, they throw a vg::Exception. Files of one program may
+ *            differ in that. Nothing else here throws or needs exceptions or run-time type information;
+ *            std::vector and std::string may throw std::bad_alloc where exceptions are on.
  *
  * Ownership. Context, Model, Scene, Gaussians and Report own one handle and are moved, not copied. One that was
  *            moved away is empty: no views, no Gaussians, and an error where it is used. A vg_view, a
  *            vg_image and a Span own nothing: they point into a Scene, a cv::Mat or Gaussians, which must
  *            outlive them.
  *
- * Options.   Options, ModelOptions, SegmentOptions, RenderOptions, SceneOptions are the structs of vg.h with
- *            their default values set. Their fields are explained there.
+ * Options.   Options, ModelOptions, SegmentOptions, RenderOptions, RefineOptions, SceneOptions are the structs of
+ *            vg.h with their default values set. Their fields are explained there. Those that hold a choice take
+ *            the enum class of that choice, `options.prior = vg::Prior::Hull`, or vg.h's own name for it,
+ *            VG_PRIOR_HULL, and nothing else: the name of another choice does not compile.
  *
  * Callbacks. on_progress and on_log take any callable. They come on the calling thread, one at a time. An
  *            exception that leaves one ends the program (std::terminate), because it cannot pass through the
@@ -46,7 +82,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
+#include <initializer_list>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <variant>
@@ -62,7 +100,16 @@
 #include <Eigen/Geometry>
 #endif
 
+#if defined(VG_HPP_EXCEPTIONS) && !defined(__cpp_exceptions) && !defined(_CPPUNWIND)
+#error "VG_HPP_EXCEPTIONS: this compiler was told to do without exceptions"
+#endif
+
 namespace vg {
+
+// What ends the program in one file and throws in another is not the same function, nor of the same type.
+#ifdef VG_HPP_EXCEPTIONS
+inline namespace throwing {
+#endif
 
 // ---- Results
 
@@ -73,17 +120,56 @@ struct Error {
     std::string message;
 };
 
+/// The name of a status, "VG_STATUS_ARGUMENT"; "" for one that the library does not know.
+inline const char *status_name(vg_status status) noexcept {
+    return vg_status_name(static_cast<std::int32_t>(status));
+}
+
+#ifdef VG_HPP_EXCEPTIONS
+
+/// What take() of a failed call throws.
+class Exception : public std::runtime_error {
+  public:
+    explicit Exception(const Error &error) : std::runtime_error(error.message), status_(error.status) {}
+
+    vg_status status() const noexcept { return status_; }
+
+  private:
+    vg_status status_;
+};
+
+#endif // VG_HPP_EXCEPTIONS
+
 namespace detail {
 
-/// A value was asked of a failed call, or an error of one that succeeded: a bug of the caller's.
+/// A Result was not what its caller took it for.
 [[noreturn]] inline void misused(const char *what, const char *message) noexcept {
     std::fprintf(stderr, "vg::Result: %s %s\n", what, message);
     std::abort();
 }
 
+#ifdef VG_HPP_EXCEPTIONS
+
+inline constexpr bool aborts = false;
+
+[[noreturn]] inline void no_value(const Error &error) {
+    throw Exception(error);
+}
+
+#else
+
+inline constexpr bool aborts = true;
+
+[[noreturn]] inline void no_value(const Error &error) noexcept {
+    misused("no value:", error.message.c_str());
+}
+
+#endif // VG_HPP_EXCEPTIONS
+
 } // namespace detail
 
-/// A value, or why there is none. Asking for the one that is not there ends the program.
+/// A value, or why there is none. Asking for a value that is not there ends the program, or throws where
+/// VG_HPP_EXCEPTIONS is defined; asking for an error that is not there ends the program.
 template <class T> class [[nodiscard]] Result {
   public:
     Result(T value) : held_(std::in_place_index<0>, std::move(value)) {}
@@ -92,13 +178,17 @@ template <class T> class [[nodiscard]] Result {
     bool ok() const noexcept { return held_.index() == 0; }
     explicit operator bool() const noexcept { return ok(); }
 
-    T &value() & noexcept { return *checked(this); }
-    const T &value() const & noexcept { return *checked(this); }
-    T &&value() && noexcept { return std::move(*checked(this)); }
-    T &operator*() & noexcept { return value(); }
-    const T &operator*() const & noexcept { return value(); }
-    T *operator->() noexcept { return checked(this); }
-    const T *operator->() const noexcept { return checked(this); }
+    T &value() & noexcept(detail::aborts) { return *checked(this); }
+    const T &value() const & noexcept(detail::aborts) { return *checked(this); }
+    T &&value() && noexcept(detail::aborts) { return std::move(*checked(this)); }
+    T &operator*() & noexcept(detail::aborts) { return value(); }
+    const T &operator*() const & noexcept(detail::aborts) { return value(); }
+    T *operator->() noexcept(detail::aborts) { return checked(this); }
+    const T *operator->() const noexcept(detail::aborts) { return checked(this); }
+
+    /// The value, or this one where the call failed.
+    T value_or(T otherwise) const & { return ok() ? value() : std::move(otherwise); }
+    T value_or(T otherwise) && { return ok() ? std::move(*checked(this)) : std::move(otherwise); }
 
     /// The value, moved out: `vg::Context context = vg::Context::make().take();`
     T take() { return std::move(*checked(this)); }
@@ -112,10 +202,11 @@ template <class T> class [[nodiscard]] Result {
     }
 
   private:
-    template <class Self> static auto checked(Self *self) noexcept -> decltype(std::get_if<0>(&self->held_)) {
+    template <class Self>
+    static auto checked(Self *self) noexcept(detail::aborts) -> decltype(std::get_if<0>(&self->held_)) {
         auto *value = std::get_if<0>(&self->held_);
         if (value == nullptr) {
-            detail::misused("no value:", std::get_if<1>(&self->held_)->message.c_str());
+            detail::no_value(*std::get_if<1>(&self->held_));
         }
         return value;
     }
@@ -133,9 +224,9 @@ template <> class [[nodiscard]] Result<void> {
     explicit operator bool() const noexcept { return ok_; }
 
     /// Nothing, so that what takes any Result also takes this one.
-    void take() const noexcept {
+    void take() const noexcept(detail::aborts) {
         if (!ok_) {
-            detail::misused("no value:", error_.message.c_str());
+            detail::no_value(error_);
         }
     }
 
@@ -152,6 +243,15 @@ template <> class [[nodiscard]] Result<void> {
 };
 
 namespace detail {
+
+/// The numbers of an array of points or pixels, one after the other; NULL where there are none.
+template <class T, std::size_t N> const T *numbers(const std::vector<std::array<T, N>> &elements) noexcept {
+    static_assert(sizeof(std::array<T, N>) == N * sizeof(T), "elements lie without gaps");
+    return elements.empty() ? nullptr : elements.front().data();
+}
+template <class T, std::size_t N> T *numbers(std::vector<std::array<T, N>> &elements) noexcept {
+    return const_cast<T *>(numbers(std::as_const(elements)));
+}
 
 /// The C error as ours; frees it.
 inline Error caught(vg_status status, vg_error *error) {
@@ -268,6 +368,135 @@ template <class Callback> void *user_pointer(const Callback &callback) noexcept 
 
 } // namespace detail
 
+// ---- Choices
+
+/// Where metric depth comes from: vg_prior.
+enum class Prior : std::int32_t {
+    Auto = VG_PRIOR_AUTO,
+    Given = VG_PRIOR_GIVEN,
+    Hull = VG_PRIOR_HULL,
+    Onnx = VG_PRIOR_ONNX,
+    Shape = VG_PRIOR_SHAPE,
+};
+
+/// How the side that was not photographed is completed: vg_symmetry.
+enum class Symmetry : std::int32_t {
+    Auto = VG_SYMMETRY_AUTO,
+    Always = VG_SYMMETRY_ALWAYS,
+    Never = VG_SYMMETRY_NEVER,
+    Flip = VG_SYMMETRY_FLIP,
+};
+
+/// Whether cameras and the plane of symmetry are corrected first: vg_calibrate.
+enum class Calibrate : std::int32_t {
+    Auto = VG_CALIBRATE_AUTO,
+    Off = VG_CALIBRATE_OFF,
+};
+
+/// Whether mirror images are shown in the light of their own side: vg_relight.
+enum class Relight : std::int32_t {
+    Auto = VG_RELIGHT_AUTO,
+    Never = VG_RELIGHT_NEVER,
+};
+
+/// What may not be left out, as a set: `vg::Keep::Overlap | vg::Keep::Floaters`. vg_keep.
+enum class Keep : std::uint32_t {
+    Nothing = 0,
+    DuplicateViews = VG_KEEP_DUPLICATE_VIEWS,
+    Overlap = VG_KEEP_OVERLAP,
+    SilhouetteEdge = VG_KEEP_SILHOUETTE_EDGE,
+    Floaters = VG_KEEP_FLOATERS,
+    ShBands = VG_KEEP_SH_BANDS,
+};
+
+constexpr Keep operator|(Keep a, Keep b) noexcept {
+    return static_cast<Keep>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));
+}
+
+/// Who runs a network: vg_provider.
+enum class Provider : std::int32_t {
+    Cpu = VG_PROVIDER_CPU,
+    Cuda = VG_PROVIDER_CUDA,
+};
+
+/// Whether a network's weights are laid out anew: vg_prepack.
+enum class Prepack : std::int32_t {
+    Auto = VG_PREPACK_AUTO,
+    Always = VG_PREPACK_ALWAYS,
+    Never = VG_PREPACK_NEVER,
+};
+
+/// Who draws: vg_backend.
+enum class Backend : std::int32_t {
+    Auto = VG_BACKEND_AUTO,
+    Cpu = VG_BACKEND_CPU,
+    Gpu = VG_BACKEND_GPU,
+};
+
+/// What is behind the vehicle: vg_background.
+enum class Background : std::int32_t {
+    Color = VG_BACKGROUND_COLOR,
+    Transparent = VG_BACKGROUND_TRANSPARENT,
+};
+
+/// What alpha has done to colours: vg_alpha.
+enum class Alpha : std::int32_t {
+    Straight = VG_ALPHA_STRAIGHT,
+    Premultiplied = VG_ALPHA_PREMULTIPLIED,
+};
+
+/// Which depth a pixel has: vg_depth_mode.
+enum class DepthMode : std::int32_t {
+    Expected = VG_DEPTH_MODE_EXPECTED,
+    Accumulated = VG_DEPTH_MODE_ACCUMULATED,
+};
+
+/// How pixels lie in memory: vg_format.
+enum class Format : std::int32_t {
+    Rgb8 = VG_FORMAT_RGB8,
+    Bgr8 = VG_FORMAT_BGR8,
+    Rgba8 = VG_FORMAT_RGBA8,
+    Bgra8 = VG_FORMAT_BGRA8,
+    Gray8 = VG_FORMAT_GRAY8,
+    Rgba32f = VG_FORMAT_RGBA32F,
+    Depth32f = VG_FORMAT_DEPTH32F,
+};
+
+/// Which end of a vehicle is its front: vg_heading.
+enum class Heading : std::int32_t {
+    Auto = VG_HEADING_AUTO,
+    Forward = VG_HEADING_FORWARD,
+    Backward = VG_HEADING_BACKWARD,
+};
+
+namespace detail {
+
+/// A number of a C struct that stands for one of the names of one enumeration: takes those names, of vg.hpp and of
+/// vg.h, and no others. It hides the number, which has the same name in the struct that it is a part of.
+template <class Choice, class Name, class Number = std::int32_t> class Field {
+  public:
+    explicit Field(Number &number) noexcept : number_(&number) {}
+    Field(const Field &) = delete;
+
+    Field &operator=(Choice choice) noexcept {
+        *number_ = static_cast<Number>(choice);
+        return *this;
+    }
+    Field &operator=(Name name) noexcept { return *this = static_cast<Choice>(name); }
+    Field &operator=(const Field &other) noexcept { return *this = static_cast<Choice>(other); }
+
+    operator Choice() const noexcept { return static_cast<Choice>(*number_); }
+    friend bool operator==(const Field &field, Name name) noexcept {
+        return static_cast<Choice>(field) == static_cast<Choice>(name);
+    }
+    friend bool operator!=(const Field &field, Name name) noexcept { return !(field == name); }
+
+  private:
+    Number *number_;
+};
+
+} // namespace detail
+
 // ---- Context
 
 /// Worker threads and scratch memory, for calls that follow each other: `options.context = context.get()`. It
@@ -364,9 +593,14 @@ inline Result<vg_camera> cropped(const vg_camera &camera, std::uint32_t x, std::
     });
 }
 
-/// Column and row of a point in the vehicle's frame; an error where it is not in front of the camera.
-inline Result<std::array<double, 2>> project(const vg_camera &camera,
-                                             const std::array<double, 3> &point_vehicle) {
+/// A point, metres, vehicle frame.
+using Point = std::array<double, 3>;
+
+/// Column and row.
+using Pixel = std::array<double, 2>;
+
+/// Column and row of a point in the vehicle's frame; an error where the camera has no picture of it.
+inline Result<std::array<double, 2>> project(const vg_camera &camera, const Point &point_vehicle) {
     return detail::filled(std::array<double, 2>{}, [&](std::array<double, 2> *out, vg_error **error) {
         return vg_camera_project(&camera, point_vehicle.data(), out->data(), error);
     });
@@ -392,10 +626,84 @@ inline Result<Pose> pose_from_opengl(const Pose &camera_to_world,
     });
 }
 
+/// A pose from OpenCV's rvec, whose direction is an axis and whose length an angle in radians, and tvec, world to
+/// camera, as cv::solvePnP leaves them.
+inline Result<Pose> pose_from_opencv(const std::array<double, 3> &rvec, const std::array<double, 3> &tvec,
+                                     const Similarity *vehicle_from_world = nullptr) {
+    return detail::filled(Pose{}, [&](Pose *out, vg_error **error) {
+        const double *similarity = vehicle_from_world == nullptr ? nullptr : vehicle_from_world->data();
+        return vg_pose_from_opencv(rvec.data(), tvec.data(), similarity, out->data(), error);
+    });
+}
+
 /// A pose from where a tracked vehicle and the camera are in a common frame.
 inline Result<Pose> pose_from_box(const Pose &vehicle_in_ego, const Pose &camera_in_ego) {
     return detail::filled(Pose{}, [&](Pose *out, vg_error **error) {
         return vg_pose_from_box(vehicle_in_ego.data(), camera_in_ego.data(), out->data(), error);
+    });
+}
+
+/// Pixels of points, and their planar depths.
+struct Projected {
+    /// NAN where the camera has no picture of the point.
+    std::vector<Pixel> pixels;
+    /// Metres; NAN where there is no pixel.
+    std::vector<double> depths;
+};
+
+/// Pixels and depths of points, through the camera's lens.
+inline Result<Projected> project(const vg_camera &camera, const std::vector<Point> &points) {
+    Projected projected{std::vector<Pixel>(points.size()), std::vector<double>(points.size())};
+    const Result<void> done = detail::done([&](vg_error **error) {
+        return vg_camera_project_points(&camera, detail::numbers(points), points.size(),
+                                        detail::numbers(projected.pixels), projected.depths.data(), error);
+    });
+    if (!done) {
+        return done.error();
+    }
+    return projected;
+}
+
+/// The point at a planar depth, metres, behind a pixel; an error where the lens has no ray to it.
+inline Result<Point> unproject(const vg_camera &camera, const Pixel &pixel, double depth_m) {
+    return detail::filled(Point{}, [&](Point *out, vg_error **error) {
+        return vg_camera_unproject(&camera, pixel.data(), depth_m, out->data(), error);
+    });
+}
+
+/// The points behind pixels, one depth each; NAN where the depth means no measurement or the lens has no ray.
+inline Result<std::vector<Point>> unproject(const vg_camera &camera, const std::vector<Pixel> &pixels,
+                                            const std::vector<double> &depths) {
+    if (pixels.size() != depths.size()) {
+        return Error{VG_STATUS_ARGUMENT, "depths: " + std::to_string(depths.size()) +
+                                             ", allowed: as many as pixels, " + std::to_string(pixels.size())};
+    }
+    std::vector<Point> points(pixels.size());
+    const Result<void> done = detail::done([&](vg_error **error) {
+        return vg_camera_unproject_points(&camera, detail::numbers(pixels), depths.data(), pixels.size(),
+                                          detail::numbers(points), error);
+    });
+    if (!done) {
+        return done.error();
+    }
+    return points;
+}
+
+/// What is up in a picture unless something else is said: the vehicle's z axis.
+constexpr Point z_up{0, 0, 1};
+
+/// A pose by where the camera stands, a point on its optical axis, and the direction that is up in the picture.
+inline Result<Pose> pose_look_at(const Point &eye, const Point &target, const Point &up = z_up) {
+    return detail::filled(Pose{}, [&](Pose *out, vg_error **error) {
+        return vg_pose_look_at(eye.data(), target.data(), up.data(), out->data(), error);
+    });
+}
+
+/// A pinhole camera at `eye` that looks at `target`; `fov_y_degrees` from the top to the bottom of the picture.
+inline Result<vg_camera> look_at(const Point &eye, const Point &target, double fov_y_degrees, std::uint32_t width,
+                                 std::uint32_t height, const Point &up = z_up) {
+    return detail::filled(vg_camera{}, [&](vg_camera *out, vg_error **error) {
+        return vg_camera_look_at(eye.data(), target.data(), up.data(), fov_y_degrees, width, height, out, error);
     });
 }
 
@@ -543,6 +851,71 @@ class Gaussians {
             [&](vg_error **error) { return vg_gaussians_save_ply(handle_.get(), path.c_str(), error); });
     }
 
+    /// From the bytes of such a file.
+    static Result<Gaussians> from_ply(const void *data, std::size_t bytes) {
+        return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
+            return vg_gaussians_load_ply_memory(data, bytes, out, error);
+        });
+    }
+    static Result<Gaussians> from_ply(const std::vector<std::uint8_t> &bytes) {
+        return from_ply(bytes.data(), bytes.size());
+    }
+
+    /// The bytes of such a file.
+    Result<std::vector<std::uint8_t>> to_ply() const {
+        std::vector<std::uint8_t> bytes(vg_gaussians_ply_size(handle_.get()));
+        const Result<void> done = detail::done([&](vg_error **error) {
+            return vg_gaussians_save_ply_memory(handle_.get(), bytes.data(), bytes.size(), error);
+        });
+        if (!done) {
+            return done.error();
+        }
+        return bytes;
+    }
+
+    /// Those at these indices, in this order; an index may come again.
+    Result<Gaussians> selected(const std::vector<std::size_t> &indices) const {
+        return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
+            return vg_gaussians_select(handle_.get(), indices.data(), indices.size(), out, error);
+        });
+    }
+
+    /// Those whose byte is not 0, in order.
+    Result<Gaussians> masked(const std::vector<std::uint8_t> &keep) const {
+        return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
+            return vg_gaussians_mask(handle_.get(), keep.data(), keep.size(), out, error);
+        });
+    }
+
+    /// Those whose centre lies in the box from `low` to `high`, its faces included, in order.
+    Result<Gaussians> cropped(const std::array<double, 3> &low, const std::array<double, 3> &high) const {
+        return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
+            return vg_gaussians_crop(handle_.get(), low.data(), high.data(), out, error);
+        });
+    }
+
+    /// Those with a peak opacity of `least` or more, in order.
+    Result<Gaussians> with_opacity_of(float least) const {
+        std::vector<std::uint8_t> keep;
+        keep.reserve(size());
+        for (const float opacity : opacities()) {
+            keep.push_back(opacity >= least);
+        }
+        return masked(keep);
+    }
+
+    /// Covariances, square metres: xx, xy, xz, yy, yz, zz of each.
+    Result<std::vector<std::array<float, 6>>> covariances() const {
+        std::vector<std::array<float, 6>> covariances(size());
+        const Result<void> done = detail::done([&](vg_error **error) {
+            return vg_gaussians_covariances(handle_.get(), detail::numbers(covariances), size(), error);
+        });
+        if (!done) {
+            return done.error();
+        }
+        return covariances;
+    }
+
     /// The same in another frame: rotation, positive scale, translation in metres.
     Result<Gaussians> transformed(const Similarity &to_from_vehicle) const {
         return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
@@ -596,14 +969,47 @@ class Gaussians {
     std::unique_ptr<vg_gaussians, detail::Free> handle_;
 };
 
+/// Cameras on a circle around Gaussians, from the vehicle's front towards its left, each with all of their centres
+/// in its picture.
+inline Result<std::vector<vg_camera>> turntable(const Gaussians &gaussians, std::size_t count, std::uint32_t width,
+                                                std::uint32_t height, double elevation_degrees = 12,
+                                                double fov_y_degrees = 35) {
+    // A count of no sensible size is the library's to refuse, before memory is asked for.
+    std::vector<vg_camera> cameras(count <= 100000 ? count : 0);
+    vg_camera none{};
+    const Result<void> done = detail::done([&](vg_error **error) {
+        return vg_cameras_turntable(gaussians.get(), count, elevation_degrees, fov_y_degrees, width, height,
+                                    cameras.empty() ? &none : cameras.data(), error);
+    });
+    if (!done) {
+        return done.error();
+    }
+    return cameras;
+}
+
 // ---- Networks
 
+namespace detail {
+
+/// vg_model_options with the choices as what they are.
+struct ModelFields : vg_model_options {
+    Field<Provider, vg_provider> provider{vg_model_options::provider};
+    Field<Prepack, vg_prepack> prepack{vg_model_options::prepack};
+
+    ModelFields() noexcept : vg_model_options{} { vg_model_options_init(this, sizeof(vg_model_options)); }
+    ModelFields(const ModelFields &other) noexcept : vg_model_options(other) {}
+    ModelFields &operator=(const ModelFields &other) noexcept {
+        vg_model_options::operator=(other);
+        return *this;
+    }
+};
+
+} // namespace detail
+
 /// How a model is opened.
-struct ModelOptions : vg_model_options {
+struct ModelOptions : detail::ModelFields {
     /// ONNX Runtime, the library or its folder; empty: see `runtime`. Used instead of `runtime`.
     std::string runtime_path;
-
-    ModelOptions() noexcept : vg_model_options{} { vg_model_options_init(this, sizeof(vg_model_options)); }
 };
 
 /// An open ONNX model, for `Options::lend_prior` and `Options::lend_head`. It must outlive the calls that use it;
@@ -659,14 +1065,33 @@ inline Result<std::vector<std::uint8_t>> segment(const Model &model, const vg_im
 
 // ---- Reconstruction
 
+namespace detail {
+
+/// vg_options with the choices as what they are.
+struct OptionFields : vg_options {
+    Field<Prior, vg_prior> prior{vg_options::prior};
+    Field<Symmetry, vg_symmetry> symmetry{vg_options::symmetry};
+    Field<Keep, vg_keep, std::uint32_t> keep{vg_options::keep};
+    Field<Calibrate, vg_calibrate> calibrate{vg_options::calibrate};
+    Field<Relight, vg_relight> relight{vg_options::relight};
+    Field<Backend, vg_backend> refine_backend{vg_options::refine_backend};
+
+    OptionFields() noexcept : vg_options{} { vg_options_init(this, sizeof(vg_options)); }
+    OptionFields(const OptionFields &other) noexcept : vg_options(other) {}
+    OptionFields &operator=(const OptionFields &other) noexcept {
+        vg_options::operator=(other);
+        return *this;
+    }
+};
+
+} // namespace detail
+
 /// Settings of a reconstruction.
-struct Options : vg_options {
+struct Options : detail::OptionFields {
     /// Used instead of `progress`.
     ProgressCallback on_progress;
     /// Used instead of `log`.
     LogCallback on_log;
-
-    Options() noexcept : vg_options{} { vg_options_init(this, sizeof(vg_options)); }
 
     /// Measured points, metres, vehicle frame: lent, and copied by the call. A temporary is refused.
     void lend_cloud(const std::vector<std::array<float, 3>> &measured) noexcept {
@@ -678,7 +1103,7 @@ struct Options : vg_options {
 
     /// Depth from a network: lent, and needed until the call returns. A temporary is refused.
     void lend_prior(const Model &model) noexcept {
-        prior = VG_PRIOR_ONNX;
+        prior = Prior::Onnx;
         prior_model = model.get();
     }
     void lend_prior(const Model &&) = delete;
@@ -756,18 +1181,83 @@ inline Result<Reconstruction> reconstruct(const std::vector<vg_view> &views, con
     return reconstruct(views.data(), views.size(), options);
 }
 
+namespace detail {
+
+/// vg_refine_options with the choice as what it is.
+struct RefineFields : vg_refine_options {
+    Field<Backend, vg_backend> backend{vg_refine_options::backend};
+
+    RefineFields() noexcept : vg_refine_options{} { vg_refine_options_init(this, sizeof(vg_refine_options)); }
+    RefineFields(const RefineFields &other) noexcept : vg_refine_options(other) {}
+    RefineFields &operator=(const RefineFields &other) noexcept {
+        vg_refine_options::operator=(other);
+        return *this;
+    }
+};
+
+} // namespace detail
+
+/// Settings of a refinement.
+struct RefineOptions : detail::RefineFields {
+    /// Used instead of `progress`.
+    ProgressCallback on_progress;
+};
+
+/// Gaussians that were refined, and what was done.
+struct Refined {
+    Gaussians gaussians;
+    vg_refinement refinement;
+};
+
+/// Moves the Gaussians of any model until their pictures are the photographs. The same input and number of steps give
+/// the same bytes.
+inline Result<Refined> refine(const Gaussians &gaussians, const std::vector<vg_view> &views,
+                              const RefineOptions &options = {}) {
+    vg_refine_options c_options = options;
+    if (options.on_progress) {
+        c_options.progress = detail::progress;
+        c_options.progress_user = detail::user_pointer(options.on_progress);
+    }
+    vg_refinement refinement;
+    vg_refinement_init(&refinement, sizeof refinement);
+    Result<Gaussians> refined = detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
+        return vg_refine(gaussians.get(), views.data(), views.size(), &c_options, out, &refinement, error);
+    });
+    if (!refined) {
+        return refined.error();
+    }
+    return Refined{refined.take(), refinement};
+}
+
 // ---- Pictures
 
 /// Settings of a picture.
 struct RenderOptions : vg_render_options {
+    detail::Field<Backend, vg_backend> backend{vg_render_options::backend};
+    detail::Field<Background, vg_background> background{vg_render_options::background};
+    detail::Field<Alpha, vg_alpha> alpha{vg_render_options::alpha};
+    detail::Field<DepthMode, vg_depth_mode> depth_mode{vg_render_options::depth_mode};
+
     RenderOptions() noexcept : vg_render_options{} {
         vg_render_options_init(this, sizeof(vg_render_options));
+    }
+    RenderOptions(const RenderOptions &other) noexcept : vg_render_options(other) {}
+    RenderOptions &operator=(const RenderOptions &other) noexcept {
+        vg_render_options::operator=(other);
+        return *this;
     }
 };
 
 /// Where a picture goes: the caller's memory.
 struct ImageTarget : vg_image_target {
+    detail::Field<Format, vg_format> color_format{vg_image_target::color_format};
+
     ImageTarget() noexcept : vg_image_target{} { vg_image_target_init(this, sizeof(vg_image_target)); }
+    ImageTarget(const ImageTarget &other) noexcept : vg_image_target(other) {}
+    ImageTarget &operator=(const ImageTarget &other) noexcept {
+        vg_image_target::operator=(other);
+        return *this;
+    }
 };
 
 /// Colour and depth, rows without gaps, the top row first.
@@ -783,8 +1273,15 @@ struct Picture {
 
 /// Settings of a renderer.
 struct RendererOptions : vg_renderer_options {
+    detail::Field<Backend, vg_backend> backend{vg_renderer_options::backend};
+
     RendererOptions() noexcept : vg_renderer_options{} {
         vg_renderer_options_init(this, sizeof(vg_renderer_options));
+    }
+    RendererOptions(const RendererOptions &other) noexcept : vg_renderer_options(other) {}
+    RendererOptions &operator=(const RendererOptions &other) noexcept {
+        vg_renderer_options::operator=(other);
+        return *this;
     }
 };
 
@@ -1030,9 +1527,17 @@ using WorldPoints = std::vector<std::array<double, 3>>;
 
 /// Settings of an alignment.
 struct AlignOptions : vg_align_options {
-    explicit AlignOptions(vg_heading front = VG_HEADING_AUTO) noexcept : vg_align_options{} {
+    detail::Field<Heading, vg_heading> heading{vg_align_options::heading};
+
+    explicit AlignOptions(Heading front = Heading::Auto) noexcept : vg_align_options{} {
         vg_align_options_init(this, sizeof(vg_align_options));
         heading = front;
+    }
+    explicit AlignOptions(vg_heading front) noexcept : AlignOptions(static_cast<Heading>(front)) {}
+    AlignOptions(const AlignOptions &other) noexcept : vg_align_options(other) {}
+    AlignOptions &operator=(const AlignOptions &other) noexcept {
+        vg_align_options::operator=(other);
+        return *this;
     }
 };
 
@@ -1124,6 +1629,16 @@ inline Error refused(const char *argument, const cv::Mat &mat, const std::string
                                          ", allowed: " + allowed};
 }
 
+/// Three numbers of a row, a column or one element, as OpenCV has rotations and translations.
+inline Result<std::array<double, 3>> triple(const char *argument, const cv::Mat &mat) {
+    if (mat.dims != 2 || mat.total() * static_cast<std::size_t>(mat.channels()) != 3) {
+        return refused(argument, mat, "3 numbers in a row or column of CV_64FC1 or CV_32FC1");
+    }
+    cv::Mat numbers;
+    mat.reshape(1, 3).convertTo(numbers, CV_64F);
+    return std::array<double, 3>{numbers.at<double>(0), numbers.at<double>(1), numbers.at<double>(2)};
+}
+
 /// A type of matrix, and what we call its pixels.
 struct MatFormat {
     int type;
@@ -1194,14 +1709,33 @@ inline Result<cv::Mat> segment(const Model &model, LentMat photograph, const vg_
 /// A mask: 128 and above is vehicle.
 inline Result<vg_image> mask(LentMat mat) {
     static constexpr detail::MatFormat formats[] = {{CV_8UC1, VG_FORMAT_GRAY8}};
-    return detail::lent("mask", mat.get(), formats, "CV_8UC1, 128 and above is vehicle");
+    return detail::lent("mask", mat.get(), formats,
+                        "CV_8UC1, 128 and above is vehicle (of 0 to 1: mat.convertTo(mask, CV_8U, 255))");
 }
 
 /// Planar depth in metres.
 inline Result<vg_image> depth(LentMat mat) {
     static constexpr detail::MatFormat formats[] = {{CV_32FC1, VG_FORMAT_DEPTH32F}};
-    return detail::lent("depth", mat.get(), formats,
-                        "CV_32FC1 in metres (of millimetres: mat.convertTo(metres, CV_32F, 0.001))");
+    return detail::lent("depth", mat.get(), formats, "CV_32FC1 in metres (of other units: vg::metres)");
+}
+
+/// Depth as sensors and PNG files have it, CV_16UC1 in millimetres, as CV_32FC1 in metres; also of floats in other
+/// units. 0 stays 0, no measurement. A view does not copy: give the matrix a name that outlives it.
+///
+///     const cv::Mat measured = vg::metres(millimetres).take();
+///     const auto view = vg::view(photograph, mask, measured, camera);
+inline Result<cv::Mat> metres(const cv::Mat &depth, double metres_per_unit = 0.001) {
+    if (!(metres_per_unit > 0 && metres_per_unit <= 1e6)) {
+        return Error{VG_STATUS_ARGUMENT, "metres_per_unit: " + std::to_string(metres_per_unit) +
+                                             ", allowed: above 0, to 1e6"};
+    }
+    const int type = depth.type();
+    if (depth.empty() || depth.dims != 2 || (type != CV_16UC1 && type != CV_32FC1 && type != CV_64FC1)) {
+        return detail::refused("depth", depth, "CV_16UC1, CV_32FC1 or CV_64FC1");
+    }
+    cv::Mat converted;
+    depth.convertTo(converted, CV_32F, metres_per_unit);
+    return converted;
 }
 
 /// A photograph with its camera; its alpha is the mask. The matrix must outlive the view.
@@ -1267,67 +1801,184 @@ inline Result<vg_camera> camera_from_opencv(const cv::Mat &k, const cv::Mat &dis
                               static_cast<std::uint32_t>(size.height), vehicle_from_camera);
 }
 
+/// OpenCV's pose, world to camera, as cv::solvePnP leaves it: rvec and tvec of 3 numbers each.
+inline Result<Pose> pose_from_opencv(const cv::Mat &rvec, const cv::Mat &tvec,
+                                     const Similarity *vehicle_from_world = nullptr) {
+    const Result<Point> turned = detail::triple("rvec", rvec), moved = detail::triple("tvec", tvec);
+    if (!turned || !moved) {
+        return turned ? moved.error() : turned.error();
+    }
+    return pose_from_opencv(*turned, *moved, vehicle_from_world);
+}
+
 namespace detail {
 
-/// Draws into matrices of the camera's size, or makes them where they are empty. `depth`: NULL: none.
-inline Result<void> render_mats(cv::Mat &color, cv::Mat *depth, const Gaussians &gaussians,
-                                const vg_camera &camera, const RenderOptions &options) {
-    const bool opaque = options.background != VG_BACKGROUND_TRANSPARENT;
+/// Matrices that a picture goes into; `depth` and `alpha` NULL: not wanted.
+struct Mats {
+    cv::Mat *color;
+    cv::Mat *depth;
+    cv::Mat *alpha;
+};
+
+/// What of `mat` is drawn into: itself, or one of the camera's size and this type where it is empty.
+inline Result<cv::Mat> drawn_into(const char *argument, const cv::Mat &mat, const vg_camera &camera,
+                                  std::initializer_list<int> types, const char *allowed) {
     const int columns = static_cast<int>(camera.width), rows = static_cast<int>(camera.height);
-    const std::string size = std::to_string(camera.width) + "x" + std::to_string(camera.height);
-    if (camera.width > 8192 || camera.height > 8192 || columns == 0 || rows == 0) {
-        return Error{VG_STATUS_ARGUMENT, "camera: " + size + ", allowed: 1x1 to 8192x8192"};
+    if (mat.empty()) {
+        return cv::Mat(rows, columns, *types.begin());
     }
-    const auto fits = [&](const cv::Mat &mat) {
-        return mat.dims == 2 && mat.cols == columns && mat.rows == rows;
-    };
-    if (!color.empty() &&
-        (!fits(color) || !(color.type() == CV_8UC4 || (opaque && color.type() == CV_8UC3)))) {
-        return refused("color", color,
-                       size + " of " + (opaque ? "CV_8UC3 or CV_8UC4" : "CV_8UC4") + ", or empty");
+    for (const int type : types) {
+        if (mat.type() == type && mat.dims == 2 && mat.cols == columns && mat.rows == rows) {
+            return mat;
+        }
     }
-    if (depth != nullptr && !depth->empty() && (!fits(*depth) || depth->type() != CV_32FC1)) {
-        return refused("depth", *depth, size + " of CV_32FC1, or empty");
+    return refused(argument, mat,
+                   std::to_string(columns) + "x" + std::to_string(rows) + " of " + allowed + ", or empty");
+}
+
+/// R and B of a CV_32FC4 exchanged: the library has RGBA, OpenCV BGRA.
+inline void exchange_red_and_blue(cv::Mat &mat) {
+    for (int row = 0; row < mat.rows; row++) {
+        float *pixel = mat.ptr<float>(row);
+        for (int column = 0; column < mat.cols; column++, pixel += 4) {
+            std::swap(pixel[0], pixel[2]);
+        }
     }
-    // The caller's stay as they are until the picture is there.
-    cv::Mat picture = color.empty() ? cv::Mat(rows, columns, opaque ? CV_8UC3 : CV_8UC4) : color;
-    cv::Mat metres;
-    if (depth != nullptr) {
-        metres = depth->empty() ? cv::Mat(rows, columns, CV_32FC1) : *depth;
+}
+
+/// Draws into matrices of the cameras' sizes, or makes them where they are empty. `draw` takes targets and cameras.
+template <class Draw>
+Result<void> render_mats(const Mats *mats, const vg_camera *cameras, std::size_t count,
+                         const RenderOptions &options, const Draw &draw) {
+    const bool opaque = options.background == Background::Color;
+    std::vector<std::array<cv::Mat, 3>> pictures;
+    std::vector<ImageTarget> targets(count);
+    for (std::size_t i = 0; i < count; i++) {
+        const vg_camera &camera = cameras[i];
+        if (camera.width > 8192 || camera.height > 8192 || camera.width == 0 || camera.height == 0) {
+            return Error{VG_STATUS_ARGUMENT, "camera: " + std::to_string(camera.width) + "x" +
+                                                 std::to_string(camera.height) +
+                                                 ", allowed: 1x1 to 8192x8192"};
+        }
+        Result<cv::Mat> color =
+            opaque ? drawn_into("color", *mats[i].color, camera, {CV_8UC3, CV_8UC4, CV_32FC4},
+                                "CV_8UC3, CV_8UC4 or CV_32FC4")
+                   : drawn_into("color", *mats[i].color, camera, {CV_8UC4, CV_32FC4}, "CV_8UC4 or CV_32FC4");
+        if (!color) {
+            return color.error();
+        }
+        pictures.push_back({color.take(), cv::Mat(), cv::Mat()});
+        auto &[picture, metres, opacity] = pictures.back();
+        ImageTarget &target = targets[i];
+        target.width = camera.width;
+        target.height = camera.height;
+        target.color = picture.data;
+        target.color_row_stride = picture.step;
+        target.color_format = picture.type() == CV_8UC3   ? Format::Bgr8
+                              : picture.type() == CV_8UC4 ? Format::Bgra8
+                                                          : Format::Rgba32f;
+        if (mats[i].depth != nullptr) {
+            Result<cv::Mat> plane = drawn_into("depth", *mats[i].depth, camera, {CV_32FC1}, "CV_32FC1");
+            if (!plane) {
+                return plane.error();
+            }
+            metres = plane.take();
+            target.depth = metres.data;
+            target.depth_row_stride = metres.step;
+        }
+        if (mats[i].alpha != nullptr) {
+            Result<cv::Mat> plane = drawn_into("alpha", *mats[i].alpha, camera, {CV_32FC1}, "CV_32FC1");
+            if (!plane) {
+                return plane.error();
+            }
+            opacity = plane.take();
+            target.alpha = opacity.data;
+            target.alpha_row_stride = opacity.step;
+        }
     }
-    ImageTarget target;
-    target.width = camera.width;
-    target.height = camera.height;
-    target.color = picture.data;
-    target.color_row_stride = picture.step;
-    target.color_format = picture.type() == CV_8UC3 ? VG_FORMAT_BGR8 : VG_FORMAT_BGRA8;
-    if (depth != nullptr) {
-        target.depth = metres.data;
-        target.depth_row_stride = metres.step;
+    // An array of vg.h's structs, without what vg.hpp adds to each.
+    const std::vector<vg_image_target> c_targets(targets.begin(), targets.end());
+    const Result<void> drawn = draw(c_targets.data(), cameras, count);
+    if (!drawn) {
+        return drawn;
     }
-    const Result<void> drawn = vg::render_into(target, gaussians, camera, options);
-    if (drawn) {
-        color = picture;
-        if (depth != nullptr) {
-            *depth = metres;
+    // The caller's were as they are until the pictures were there.
+    for (std::size_t i = 0; i < count; i++) {
+        auto &[picture, metres, opacity] = pictures[i];
+        if (picture.type() == CV_32FC4) {
+            exchange_red_and_blue(picture);
+        }
+        *mats[i].color = picture;
+        if (mats[i].depth != nullptr) {
+            *mats[i].depth = metres;
+        }
+        if (mats[i].alpha != nullptr) {
+            *mats[i].alpha = opacity;
         }
     }
     return drawn;
 }
 
+inline Result<void> render_mats(const Mats &mats, const Gaussians &gaussians, const vg_camera &camera,
+                                const RenderOptions &options) {
+    return render_mats(&mats, &camera, 1, options,
+                       [&](const vg_image_target *target, const vg_camera *seen, std::size_t) {
+                           return vg::render_into(*target, gaussians, *seen, options);
+                       });
+}
+
+inline Result<void> render_mats(const Mats &mats, const Renderer &renderer, const vg_camera &camera,
+                                const RenderOptions &options) {
+    return render_mats(&mats, &camera, 1, options,
+                       [&](const vg_image_target *targets, const vg_camera *seen, std::size_t count) {
+                           return renderer.render_into(targets, seen, count, options);
+                       });
+}
+
 } // namespace detail
 
-/// Draws into a matrix, which may be a region of a larger one: CV_8UC3 (BGR) or CV_8UC4 (BGRA) of the
-/// camera's size. An empty one becomes CV_8UC3, or CV_8UC4 where the background is transparent.
-inline Result<void> render_into(cv::Mat &color, const Gaussians &gaussians, const vg_camera &camera,
-                                const RenderOptions &options = {}) {
-    return detail::render_mats(color, nullptr, gaussians, camera, options);
+/// Draws Gaussians, or with a Renderer what it was made of, into a matrix, which may be a region of a larger one:
+/// CV_8UC3 (BGR), CV_8UC4 (BGRA) or CV_32FC4 (BGRA, 0 to 1, not clamped above 1) of the camera's size. An empty one
+/// becomes CV_8UC3, or CV_8UC4 where the background is transparent.
+template <class Model>
+Result<void> render_into(cv::Mat &color, const Model &model, const vg_camera &camera,
+                         const RenderOptions &options = {}) {
+    return detail::render_mats({&color, nullptr, nullptr}, model, camera, options);
 }
 
 /// The same with planar depth in metres: CV_32FC1 of the camera's size, or empty.
-inline Result<void> render_into(cv::Mat &color, cv::Mat &depth, const Gaussians &gaussians,
-                                const vg_camera &camera, const RenderOptions &options = {}) {
-    return detail::render_mats(color, &depth, gaussians, camera, options);
+template <class Model>
+Result<void> render_into(cv::Mat &color, cv::Mat &depth, const Model &model, const vg_camera &camera,
+                         const RenderOptions &options = {}) {
+    return detail::render_mats({&color, &depth, nullptr}, model, camera, options);
+}
+
+/// The same with alpha too, 0 to 1: CV_32FC1 of the camera's size, or empty.
+template <class Model>
+Result<void> render_into(cv::Mat &color, cv::Mat &depth, cv::Mat &alpha, const Model &model,
+                         const vg_camera &camera, const RenderOptions &options = {}) {
+    return detail::render_mats({&color, &depth, &alpha}, model, camera, options);
+}
+
+/// One picture per camera in one call; a graphics processor draws the next while one is read. `colors` becomes as long
+/// as `cameras`.
+inline Result<void> render_into(std::vector<cv::Mat> &colors, const Renderer &renderer,
+                                const std::vector<vg_camera> &cameras, const RenderOptions &options = {}) {
+    std::vector<cv::Mat> drawn(colors);
+    drawn.resize(cameras.size());
+    std::vector<detail::Mats> mats;
+    for (cv::Mat &color : drawn) {
+        mats.push_back({&color, nullptr, nullptr});
+    }
+    const Result<void> done = detail::render_mats(
+        mats.data(), cameras.data(), cameras.size(), options,
+        [&](const vg_image_target *targets, const vg_camera *seen, std::size_t count) {
+            return renderer.render_into(targets, seen, count, options);
+        });
+    if (done) {
+        colors = std::move(drawn);
+    }
+    return done;
 }
 
 #endif // VG_HAS_OPENCV
@@ -1403,6 +2054,10 @@ rows(const Span<const T> &array) {
 }
 
 #endif // VG_HAS_EIGEN
+
+#ifdef VG_HPP_EXCEPTIONS
+} // namespace throwing
+#endif
 
 } // namespace vg
 

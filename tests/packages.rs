@@ -365,6 +365,64 @@ fn vg_hpp_alone_compiles_clean_and_keeps_its_promises_without_exceptions() {
 }
 
 #[test]
+fn vg_hpp_throws_where_it_is_told_to_beside_files_that_are_not() {
+    for (compiler, standard) in compilers() {
+        let command = |extra: &[&str], source: &str| {
+            let mut command = strict(&compiler, standard, &[]);
+            command.args(ALONE).args(extra).arg("-fsyntax-only").arg(test_source(source));
+            command
+        };
+        let mut both = strict(&compiler, standard, &[]);
+        both.args(ALONE);
+        run_test(both, &["throwing.cpp", "other_file.cpp"], &[]);
+        let refused = output(&mut command(&NO_EXCEPTIONS, "throwing.cpp"));
+        let errors = String::from_utf8_lossy(&refused.stderr);
+        assert!(!refused.status.success() && errors.contains("do without exceptions"), "{errors}");
+    }
+}
+
+/// The programs in the comment that `vg.hpp` begins with.
+fn examples_of_vg_hpp() -> Vec<String> {
+    let header = std::fs::read_to_string(root().join("include/vg.hpp")).unwrap();
+    let comment = header.split_once("*/").unwrap().0;
+    let mut examples = vec![String::new()];
+    for line in comment.lines() {
+        match line.strip_prefix(" *     ") {
+            Some(code) => *examples.last_mut().unwrap() += &format!("{code}\n"),
+            // An empty line inside a program, or what follows it.
+            None if line == " *" => *examples.last_mut().unwrap() += "\n",
+            None => examples.push(String::new()),
+        }
+    }
+    examples.retain(|example| example.contains("int main("));
+    examples
+}
+
+#[test]
+fn the_examples_in_vg_hpp_compile_and_say_why_they_made_nothing() {
+    if !have(&cxx(), "g++", "the examples in vg.hpp") {
+        return;
+    }
+    let examples = examples_of_vg_hpp();
+    assert_eq!(examples.len(), 2, "{examples:?}");
+    for example in examples {
+        let folder = scratch();
+        crate::tools::library_folder(folder.path());
+        let (source, test) = (folder.path().join("example.cpp"), folder.path().join("example"));
+        std::fs::write(&source, &example).unwrap();
+        let mut compile = strict(&cxx(), "c++17", &[]);
+        compile.args(ALONE).arg(&source).arg("-o").arg(&test);
+        compile.arg("-L").arg(folder.path()).arg(format!("-Wl,-rpath,{}", folder.path().display()));
+        run(compile.arg("-lvg"));
+        let result = output(program(&test).arg(folder.path()).current_dir(folder.path()));
+        let errors = String::from_utf8_lossy(&result.stderr);
+        assert_eq!(result.status.code(), Some(1), "{errors}");
+        assert!(errors.starts_with("VG_STATUS_") && errors.contains(": "), "{errors}");
+        assert!(!folder.path().join("car.ply").exists());
+    }
+}
+
+#[test]
 fn vg_hpp_takes_and_fills_matrices_of_opencv() {
     if !have(&cxx(), "g++", "vg.hpp with OpenCV")
         || !have_library("opencv4", "libopencv-dev", "vg.hpp with OpenCV")

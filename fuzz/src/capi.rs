@@ -76,7 +76,7 @@ pub fn execute<S: Source>(world: &World, source: &mut S) -> Vec<(&'static str, v
             change(world, &mut call, &made, source);
         }
         match call.function {
-            "vg_reconstruct" => back_views(&mut call),
+            "vg_reconstruct" | "vg_refine" => back_views(&mut call),
             "vg_render" => back_target(&mut call),
             "vg_render_backward" => back_gradients(&mut call),
             "vg_gaussians_from_arrays" => back_arrays(&mut call),
@@ -160,7 +160,16 @@ fn change<S: Source>(world: &World, call: &mut Call, made: &[Done], source: &mut
     match &mut call.arguments[i].value {
         Value::Number(value) => {
             let any = bits_of(source.pick(&NUMBERS));
+            let now = *value;
             *value = match name {
+                // Of memory that stays as large as it is.
+                "count" | "point_count" | "sparse_count" | "scan_count" | "index_count" | "keep_count" => {
+                    match source.below(3) {
+                        0 if !tries.is_empty() => tries[source.below(tries.len())].0,
+                        _ => source.below(now as usize + 1) as u64,
+                    }
+                }
+                "size" if call.function.contains("ply_memory") => source.below(now as usize + 1) as u64,
                 "view_count" | "param_count" | "distortion_count" | "size" => match source.below(3) {
                     0 if !tries.is_empty() => tries[source.below(tries.len())].0,
                     _ if name == "view_count" => source.below(5) as u64,

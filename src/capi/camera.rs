@@ -149,7 +149,7 @@ unsafe fn optional_pose(argument: &str, pose: *const f64) -> Result<Pose> {
     Pose::from_row_major(argument, &unsafe { read::fixed(argument, pose)? })
 }
 
-unsafe fn write_pose(out: *mut f64, pose: &Pose) -> Result<()> {
+pub(super) unsafe fn write_pose(out: *mut f64, pose: &Pose) -> Result<()> {
     let rows = pose.to_row_major();
     if !rows.iter().all(|v| v.is_finite()) {
         return Err(Error::argument("pose", "numbers that overflow", "a finite result"));
@@ -342,6 +342,33 @@ pub unsafe extern "C" fn vg_pose_from_opengl(
     }
 }
 
+/// A pose from OpenCV's `cv::solvePnP`, `cv::calibrateCamera` or ArUco: world to camera. With `vg_camera_from_opencv` it
+/// makes a whole camera.
+///
+/// - rvec: 3 numbers, a rotation vector: its direction is the axis, its length the angle in radians.
+/// - tvec: 3 numbers.
+/// - vehicle_from_world: 16 numbers, as in `vg_pose_from_colmap`. NULL: the world, where the object's points were
+///   measured, is the vehicle's frame.
+/// - out: receives 12 numbers, camera to vehicle, as in `vg_camera`; unchanged on failure.
+/// - out_error: NULL, or receives the error.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_pose_from_opencv(
+    rvec: *const f64,
+    tvec: *const f64,
+    vehicle_from_world: *const f64,
+    out: *mut f64,
+    out_error: *mut *mut vg_error,
+) -> vg_status {
+    unsafe {
+        guarded(out_error, || {
+            read::not_null("out", out, "12 numbers")?;
+            let (rvec, tvec) = (read::fixed("rvec", rvec)?, read::fixed("tvec", tvec)?);
+            let pose = frame::pose_from_opencv("rvec, tvec", rvec, tvec)?;
+            write_pose(out, &in_vehicle(pose, vehicle_from_world)?)
+        })
+    }
+}
+
 /// A pose from a tracked box: where the vehicle and the camera are in any common frame (ego, map, UTM) at the
 /// moment of the picture. The vehicle may move between pictures. Camera axes x right, y down, z forward; box axes
 /// x forward, y left, z up, its origin on the vehicle's plane of symmetry.
@@ -368,12 +395,13 @@ pub unsafe extern "C" fn vg_pose_from_box(
     }
 }
 
-/// The pixel of a point.
+/// The pixel of a point. For many points, `vg_camera_project_points`.
 ///
 /// - camera: is not changed.
 /// - point_vehicle: 3 numbers, metres, vehicle frame.
 /// - out_pixel: receives 2 numbers, column and row; a picture's pixels are 0 to width and 0 to height. Unchanged on
-///   failure, and where the point lies on or behind the camera's plane, which is `VG_STATUS_ARGUMENT`.
+///   failure, and where the camera has no picture of the point, which is `VG_STATUS_ARGUMENT`: on or behind its plane, and
+///   beyond the angle at which its lens model folds back.
 /// - out_error: NULL, or receives the error.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn vg_camera_project(
@@ -387,11 +415,11 @@ pub unsafe extern "C" fn vg_camera_project(
             read::not_null("out_pixel", out_pixel, "2 numbers")?;
             let camera = self::camera("camera", &read::required("camera", camera)?)?;
             let point = DVec3::from_array(read::fixed("point_vehicle", point_vehicle)?);
-            let in_camera = camera.vehicle_from_camera.inverse().transform_point(point);
-            let pixel = camera.project(in_camera).filter(|p| p.iter().all(|v| v.is_finite()));
-            let pixel = pixel.ok_or_else(|| {
-                let found = format!("{point}, {} m along the optical axis", in_camera.z);
-                Error::argument("point_vehicle", found, "a finite point in front of the camera")
+            let pixel = camera.pixel_from_vehicle(point).ok_or_else(|| {
+                let along = camera.vehicle_from_camera.inverse().transform_point(point).z;
+                let found = format!("{point}, {along} m along the optical axis");
+                let allowed = "a finite point in front of the camera, where its lens has a picture of it";
+                Error::argument("point_vehicle", found, allowed)
             })?;
             out_pixel.cast::<[f64; 2]>().write_unaligned(pixel);
             Ok(())

@@ -13,7 +13,7 @@ use std::ffi::c_char;
 use std::sync::Arc;
 
 /// A set of Gaussians. Owned by the caller, who frees it with `vg_gaussians_free`. It never changes: `transform`,
-/// `mirror` and `merge` return new ones, and any number of threads may read or render one at a time.
+/// `mirror`, `merge`, `select`, `mask` and `crop` return new ones, and any number of threads may read or render one at a time.
 pub struct vg_gaussians {
     _private: [u8; 0],
 }
@@ -314,7 +314,7 @@ pub unsafe extern "C" fn vg_gaussians_free(gaussians: *mut vg_gaussians) {
     });
 }
 
-unsafe fn make(
+pub(super) unsafe fn make(
     out: *mut *mut vg_gaussians,
     out_error: *mut *mut vg_error,
     body: impl FnOnce() -> Result<Gaussians>,

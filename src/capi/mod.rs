@@ -37,9 +37,15 @@ mod report;
 
 mod gaussians;
 
+mod select;
+
+mod placed;
+
 mod watched;
 
 mod reconstruct;
+
+mod refine;
 
 mod render;
 
@@ -67,12 +73,15 @@ pub use image::*;
 pub use metrics::*;
 pub use model::*;
 pub use options::*;
+pub use placed::*;
 pub use reconstruct::*;
+pub use refine::*;
 pub use render::*;
 pub use renderer::*;
 pub use report::*;
 pub use scene::*;
 pub use segment::*;
+pub use select::*;
 pub use status::*;
 pub use version::*;
 pub use view::*;

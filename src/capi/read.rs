@@ -72,6 +72,12 @@ pub(super) unsafe fn fill<T: Versioned>(argument: &str, target: *mut T, value: &
     Ok(())
 }
 
+/// Whether [`fill`] will take a caller's struct: to be known before the work that fills it.
+pub(super) unsafe fn fillable<T: Versioned>(argument: &str, target: *const T) -> Result<()> {
+    not_null(argument, target, T::NAME)?;
+    unsafe { struct_size(argument, target).map(|_| ()) }
+}
+
 /// What every `_init` function does; `size` is the caller's `sizeof`.
 pub(super) unsafe fn initialize<T: Versioned>(argument: &str, target: *mut T, size: usize) -> Result<()> {
     if target.is_null() {
@@ -198,6 +204,11 @@ pub(super) unsafe fn fixed<const N: usize>(argument: &str, pointer: *const f64) 
         return Err(Error::argument(argument, "NULL", format!("{N} numbers")));
     }
     Ok(unsafe { pointer.cast::<[f64; N]>().read_unaligned() })
+}
+
+/// Where `count` numbers go; they may be nowhere where `count` is 0.
+pub(super) fn writable<T>(argument: &str, pointer: *const T, count: usize) -> Result<()> {
+    if count == 0 { Ok(()) } else { not_null(argument, pointer, &format!("{count} elements")) }
 }
 
 /// The address of numbers that are lent to the caller; NULL where there are none.

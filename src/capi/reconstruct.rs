@@ -60,11 +60,11 @@ unsafe fn run(
     options: &vg_options,
 ) -> Result<Reconstruction> {
     let told = Told { callback: options.progress, user: options.progress_user };
-    let mut progress = |progress: Progress| {
+    let mut progress = |at: Progress| {
         if !options.progress_overall.is_null() {
-            unsafe { options.progress_overall.write_unaligned(progress.overall) };
+            unsafe { options.progress_overall.write_unaligned(at.overall) };
         }
-        unsafe { told.tell(progress) }
+        unsafe { told.tell(at) }
     };
     let mut made = pipeline::reconstruct_on(&shop.threads, scene, settings, &mut progress)?;
     made.report.settings.threads = shop.threads.count();

@@ -2,7 +2,7 @@
 
 use super::guard::{Failure, free, guarded_value};
 use crate::error::Error;
-use std::ffi::{CString, c_char};
+use std::ffi::{CStr, CString, c_char};
 
 /// What a function returns. Numbers are never reused; later versions may add some, so treat an unknown one as a
 /// failure.
@@ -92,6 +92,45 @@ pub(super) fn c_string(text: String) -> CString {
     CString::new(text).unwrap_or_else(|e| {
         let text = String::from_utf8_lossy(&e.into_vec()).replace('\0', "\u{fffd}");
         CString::new(text).unwrap_or_default()
+    })
+}
+
+impl vg_status {
+    const ALL: [Self; 9] = [
+        Self::Ok,
+        Self::Argument,
+        Self::Format,
+        Self::Io,
+        Self::Reconstruction,
+        Self::Cancelled,
+        Self::NotBuilt,
+        Self::Internal,
+        Self::Missing,
+    ];
+
+    /// Its name in C.
+    fn name(self) -> &'static CStr {
+        match self {
+            Self::Ok => c"VG_STATUS_OK",
+            Self::Argument => c"VG_STATUS_ARGUMENT",
+            Self::Format => c"VG_STATUS_FORMAT",
+            Self::Io => c"VG_STATUS_IO",
+            Self::Reconstruction => c"VG_STATUS_RECONSTRUCTION",
+            Self::Cancelled => c"VG_STATUS_CANCELLED",
+            Self::NotBuilt => c"VG_STATUS_NOT_BUILT",
+            Self::Internal => c"VG_STATUS_INTERNAL",
+            Self::Missing => c"VG_STATUS_MISSING",
+        }
+    }
+}
+
+/// The name of a `vg_status`: `VG_STATUS_ARGUMENT` for 1. A number that this library does not know: an empty string. Never
+/// NULL; lives for ever.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_status_name(status: i32) -> *const c_char {
+    guarded_value(c"".as_ptr(), || {
+        let known = vg_status::ALL.into_iter().find(|known| *known as i32 == status);
+        known.map_or(c"", vg_status::name).as_ptr()
     })
 }
 

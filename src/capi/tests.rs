@@ -66,6 +66,12 @@ fn layout_of_rust() -> String {
             refine_backend refine_flags
         }
         vg_picture_errors { struct_size psnr_db ssim lpips }
+        vg_refine_options {
+            struct_size context seconds iterations hold_out densify backend progress progress_user flags
+        }
+        vg_refinement {
+            struct_size iterations made kept stop psnr_before_db psnr_after_db held_out_before_db held_out_after_db
+        }
         vg_render_options {
             struct_size context backend background background_color alpha depth_mode sh_degree antialiased blur
             near_plane far_plane max_alpha flags
@@ -129,6 +135,7 @@ fn numbers_of_rust() -> BTreeSet<String> {
         vg_prepack { Auto Always Never }
         vg_prior { Auto Given Hull Onnx Shape }
         vg_provider { Cpu Cuda }
+        vg_refine_stop { Done HeldOut Diverged Unseen }
         vg_relight { Auto Never }
         vg_status { Ok Argument Format Io Reconstruction Cancelled NotBuilt Internal Missing }
         vg_symmetry { Auto Always Never Flip }
@@ -141,6 +148,19 @@ fn rust_has_the_golden_numbers() {
     let golden = std::fs::read_to_string(tools::golden().join("layout_x86_64.txt")).unwrap();
     let golden: BTreeSet<String> = golden.lines().filter(|l| l.contains(" = ")).map(str::to_owned).collect();
     assert_eq!(numbers_of_rust(), golden);
+}
+
+#[test]
+fn every_status_is_called_what_the_header_calls_it() {
+    let golden = std::fs::read_to_string(tools::golden().join("layout_x86_64.txt")).unwrap();
+    let statuses = golden.lines().filter(|l| l.starts_with("VG_STATUS_")).filter_map(|l| l.split_once(" = "));
+    let mut count = 0;
+    for (name, number) in statuses {
+        let found = unsafe { CStr::from_ptr(vg_status_name(number.parse().unwrap())) };
+        assert_eq!(found.to_str(), Ok(name));
+        count += 1;
+    }
+    assert!(count >= 9, "{count} statuses");
 }
 
 /// Names every struct, so that safer-ffi writes them all into its header.
@@ -178,6 +198,10 @@ fn vg_abi_witness_metrics(
     _: &vg_surface_errors,
 ) {
 }
+
+/// Those of the refinement.
+#[safer_ffi::ffi_export]
+fn vg_abi_witness_refine(_: &vg_refine_options, _: &vg_refinement) {}
 
 /// Those of the alignment.
 #[safer_ffi::ffi_export]
@@ -228,6 +252,7 @@ fn every_function() -> Vec<(&'static str, Call)> {
         }};
     }
     functions! {
+        vg_status_name(1) text;
         vg_error_message(null()) text;
         vg_error_free(null_mut()) none;
         vg_context_options_init(null_mut(), 0) status;
@@ -242,7 +267,14 @@ fn every_function() -> Vec<(&'static str, Call)> {
         vg_camera_project(null(), null(), null_mut()) reports;
         vg_pose_from_colmap(null(), null(), null(), null_mut()) reports;
         vg_pose_from_opengl(null(), null(), null_mut()) reports;
+        vg_pose_from_opencv(null(), null(), null(), null_mut()) reports;
         vg_pose_from_box(null(), null(), null_mut()) reports;
+        vg_pose_look_at(null(), null(), null(), null_mut()) reports;
+        vg_camera_look_at(null(), null(), null(), 0.0, 0, 0, null_mut()) reports;
+        vg_cameras_turntable(null(), 0, 0.0, 0.0, 0, 0, null_mut()) reports;
+        vg_camera_project_points(null(), null(), 0, null_mut(), null_mut()) reports;
+        vg_camera_unproject(null(), null(), 0.0, null_mut()) reports;
+        vg_camera_unproject_points(null(), null(), null(), 0, null_mut()) reports;
         vg_view_init(null_mut(), 0) status;
         vg_model_options_init(null_mut(), 0) status;
         vg_model_open(null(), null(), null_mut()) reports;
@@ -269,8 +301,18 @@ fn every_function() -> Vec<(&'static str, Call)> {
         vg_gaussians_transform(null(), null(), null_mut()) reports;
         vg_gaussians_mirror(null(), null_mut()) reports;
         vg_gaussians_merge(null(), null(), null_mut()) reports;
+        vg_gaussians_select(null(), null(), 0, null_mut()) reports;
+        vg_gaussians_mask(null(), null(), 0, null_mut()) reports;
+        vg_gaussians_crop(null(), null(), null(), null_mut()) reports;
+        vg_gaussians_covariances(null(), null_mut(), 0) reports;
+        vg_gaussians_load_ply_memory(null(), 0, null_mut()) reports;
+        vg_gaussians_ply_size(null()) value;
+        vg_gaussians_save_ply_memory(null(), null_mut(), 0) reports;
         vg_gaussians_free(null_mut()) none;
         vg_reconstruct(null(), 0, null(), null_mut(), null_mut()) reports;
+        vg_refine_options_init(null_mut(), 0) status;
+        vg_refinement_init(null_mut(), 0) status;
+        vg_refine(null(), null(), 0, null(), null_mut(), null_mut()) reports;
         vg_render_options_init(null_mut(), 0) status;
         vg_image_target_init(null_mut(), 0) status;
         vg_render(null(), null(), null(), null()) reports;

@@ -20,6 +20,7 @@ pub(crate) mod unfolded;
 pub use align::Similarity;
 pub use camera::{Camera, CameraModel, Intrinsics, OpenCvModel};
 pub use distortion::Distortion;
+pub use pixels::PixelAndDepth;
 pub use placed::Turntable;
 pub use pose::Pose;
 pub use robust::RobustFit;

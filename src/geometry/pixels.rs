@@ -1,11 +1,22 @@
 //! Points of the vehicle's frame to pixels and back, through the camera's lens.
 
 use super::camera::Camera;
+use super::unfolded::Unfolded;
 use glam::DVec3;
 
 /// Largest difference, relative to the radius from the axis, of a ray and what the lens makes of its pixel. Beyond a
 /// fold of the model the two are rays apart; short of it they differ by what [`Camera::ray`] is solved to, 1e-9.
 const SAME_RAY: f64 = 1e-6;
+
+/// From so many points on, a table of where the lens folds takes less time than following each pixel back: it costs as
+/// much as some thousand of them.
+const TABLE_PAYS: usize = 5_000;
+
+/// Radius from the axis, x/z, up to which the table looks where a corner of the picture has no ray: 76 degrees.
+const WIDEST_RADIUS: f64 = 4.0;
+
+/// A pixel, and the planar depth of the point that is seen there, metres.
+pub type PixelAndDepth = ([f64; 2], f64);
 
 impl Camera {
     /// Column and row of a point, metres, vehicle frame. `None` where the camera has no picture of it: on or behind its
@@ -15,15 +26,39 @@ impl Camera {
     }
 
     /// The same with the point's planar depth, metres along the optical axis.
-    pub fn pixel_and_depth(&self, point_vehicle: DVec3) -> Option<([f64; 2], f64)> {
+    pub fn pixel_and_depth(&self, point_vehicle: DVec3) -> Option<PixelAndDepth> {
+        self.pixel_and_depth_by(None, point_vehicle)
+    }
+
+    /// The same of many points, in their order; the answers are those for each.
+    pub fn pixels_and_depths(&self, points_vehicle: &[[f64; 3]]) -> Vec<Option<PixelAndDepth>> {
+        let has_table = points_vehicle.len() >= TABLE_PAYS && !self.distortion.is_none();
+        let table = has_table.then(|| Unfolded::new(&self.distortion, self.corner_radius()));
+        let each = |&point| self.pixel_and_depth_by(table.as_ref(), DVec3::from_array(point));
+        points_vehicle.iter().map(each).collect()
+    }
+
+    /// `table` spares the points that it contains the way back through the lens.
+    fn pixel_and_depth_by(&self, table: Option<&Unfolded>, point_vehicle: DVec3) -> Option<PixelAndDepth> {
         let point = self.vehicle_from_camera.inverse().transform_point(point_vehicle);
         let pixel = self.project(point).filter(|p| p.iter().all(|v| v.is_finite()))?;
-        (self.distortion.is_none() || self.is_seen_along(point, pixel)).then_some((pixel, point.z))
+        let ray = [point.x / point.z, point.y / point.z];
+        let seen = self.distortion.is_none()
+            || table.is_some_and(|table| table.contains(ray))
+            || self.is_seen_along(ray, pixel);
+        seen.then_some((pixel, point.z))
+    }
+
+    /// Largest x/z, y/z of the picture's corners.
+    fn corner_radius(&self) -> f64 {
+        let (width, height) = (f64::from(self.width), f64::from(self.height));
+        let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];
+        let radius = |pixel| self.ray(pixel).map_or(WIDEST_RADIUS, |ray| ray.x.hypot(ray.y));
+        corners.into_iter().map(radius).fold(0.0, f64::max).min(WIDEST_RADIUS)
     }
 
     /// Whether the lens leads this pixel back to the point it was projected from.
-    fn is_seen_along(&self, point_camera: DVec3, pixel: [f64; 2]) -> bool {
-        let [x, y] = [point_camera.x / point_camera.z, point_camera.y / point_camera.z];
+    fn is_seen_along(&self, [x, y]: [f64; 2], pixel: [f64; 2]) -> bool {
         self.ray(pixel).is_some_and(|ray| (ray.x - x).hypot(ray.y - y) <= SAME_RAY * (1.0 + x.hypot(y)))
     }
 
@@ -76,6 +111,24 @@ mod tests {
         let at = |r: f64| camera.pixel_from_vehicle(DVec3::new(r, 0.0, 1.0));
         assert!(at(0.78).is_some() && at(1.2).is_none());
         assert!(camera.project(DVec3::new(1.2, 0.0, 1.0)).is_some(), "the lens model alone has one");
+    }
+
+    #[test]
+    fn many_points_have_the_pixels_of_each() {
+        // The last of them folds within the points' angles.
+        let fold = Distortion::Brown { k: [-0.3, 0.0, 0.0, 0.0, 0.0, 0.0], p: [1e-3, 0.0] };
+        for distortion in [Distortion::None, BROWN, FISHEYE, fold] {
+            let camera = camera(distortion);
+            let point = |i: usize| {
+                let t = i as f64;
+                [4.0 * (0.7 * t).sin(), 4.0 * (1.3 * t).cos(), 3.0 * (0.3 * t).sin()]
+            };
+            let points: Vec<[f64; 3]> = (0..TABLE_PAYS).map(point).collect();
+            let many = camera.pixels_and_depths(&points);
+            let each: Vec<_> = points.iter().map(|p| camera.pixel_and_depth(DVec3::from_array(*p))).collect();
+            assert_eq!(many, each, "{distortion:?}");
+            assert!(many.iter().flatten().count() > TABLE_PAYS / 2);
+        }
     }
 
     #[test]

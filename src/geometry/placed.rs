@@ -11,6 +11,9 @@ const LEAST_TILT: f64 = 1e-6;
 /// Smallest cylinder that a turntable walks around, metres: a single Gaussian has no extent.
 const LEAST_RADIUS_M: f64 = 1e-3;
 
+/// Share of the distance at which all centres just fit: what Gaussians reach beyond their centres is in the picture too.
+const MARGIN: f64 = 1.02;
+
 /// Most cameras of one turntable.
 const MOST_CAMERAS: usize = 100_000;
 
@@ -136,12 +139,10 @@ impl Turntable {
         let intrinsics = Intrinsics::from_fov(width, height, self.fov_y_degrees)?;
         let unplaced = Camera::pinhole(width, height, intrinsics, Pose::IDENTITY)?;
         let (sin, cos) = self.elevation_degrees.to_radians().sin_cos();
-        // The cylinder around the box fits between the picture's borders from every side.
         let radius = half.x.hypot(half.y).max(LEAST_RADIUS_M);
         let tangent = |side: u32| 0.5 * f64::from(side) / intrinsics.fx;
-        let for_width = radius / tangent(width).atan().sin();
-        let for_height = (half.z * cos + radius * sin.abs()) / tangent(height) + radius;
-        let distance = for_width.max(for_height);
+        let fits = fitting_distance(radius, half.z, (sin, cos), [tangent(width), tangent(height)]);
+        let distance = MARGIN * fits;
         let camera = |i: usize| {
             let azimuth = std::f64::consts::TAU * i as f64 / count as f64;
             let outwards = DVec3::new(azimuth.cos() * cos, azimuth.sin() * cos, sin);
@@ -151,6 +152,24 @@ impl Turntable {
         };
         (0..count).map(camera).collect()
     }
+}
+
+/// Least distance, from its middle, of a camera that has an upright cylinder between the borders of its picture.
+/// `tangents` of half its fields of view, `(sin, cos)` of the angle by which it looks down.
+///
+/// A point of the rims at azimuth a from the line of sight and height z lies r cos(a) cos + z sin nearer to the camera
+/// than the middle, r sin(a) beside the middle and z cos - r cos(a) sin above it. Beside it, the sum of the two is largest
+/// at tan(a) = 1 / (tangent cos); above it, at one of a = 0 and a = pi.
+fn fitting_distance(
+    radius: f64,
+    half_height: f64,
+    (sin, cos): (f64, f64),
+    [tangent_x, tangent_y]: [f64; 2],
+) -> f64 {
+    let for_width = radius * cos.hypot(1.0 / tangent_x) + half_height * sin.abs();
+    let ends = [-radius, radius].into_iter().flat_map(|r| [(r, -half_height), (r, half_height)]);
+    let for_height = ends.map(|(r, z)| (z * cos - r * sin).abs() / tangent_y + r * cos + z * sin);
+    for_height.fold(for_width, f64::max)
 }
 
 #[cfg(test)]
@@ -205,11 +224,15 @@ mod tests {
     #[test]
     fn a_turntable_has_the_whole_box_in_every_picture_and_begins_in_front() {
         let (low, high) = ([-2.5, -0.9, -0.7], [2.1, 0.8, 0.9]);
-        for (elevation_degrees, width, height) in [(12.0, 640, 480), (-20.0, 300, 900), (80.0, 900, 300)] {
-            let table = Turntable { elevation_degrees, ..Turntable::default() };
+        let cases =
+            [(12.0, 35.0, 640, 480), (-20.0, 35.0, 300, 900), (80.0, 120.0, 900, 300), (30.0, 170.0, 64, 64)];
+        for (elevation_degrees, fov_y_degrees, width, height) in cases {
+            let table = Turntable { elevation_degrees, fov_y_degrees };
             let cameras = table.cameras(low, high, 7, width, height).unwrap();
             assert_eq!(cameras.len(), 7);
-            assert!(cameras[0].center().x > 2.1 && cameras[1].center().y > 0.8);
+            let (first, second) = (cameras[0].center(), cameras[1].center());
+            // The box's middle is (-0.2, -0.05, 0.1), of f32.
+            assert!(first.x > 0.0 && (first.y + 0.05).abs() < 1e-6 && second.y > 0.1, "{first} {second}");
             for camera in &cameras {
                 for corner in 0..8 {
                     let side = |k: usize| f64::from(if corner >> k & 1 == 0 { low[k] } else { high[k] });

@@ -195,9 +195,10 @@ fn expected(outcome: Outcome, words: String) -> Expect {
 const SIZED: [&str; 2] = ["vg_report_get_figures", "vg_scene_get_view"];
 
 /// Functions that cannot fail, all called by `what_cannot_fail_accepts_null`.
-const NEVER_FAIL: [&str; 26] = [
+const NEVER_FAIL: [&str; 28] = [
     "vg_version",
     "vg_abi_version",
+    "vg_status_name",
     "vg_error_code",
     "vg_error_message",
     "vg_error_free",
@@ -215,6 +216,7 @@ const NEVER_FAIL: [&str; 26] = [
     "vg_gaussians_rotations",
     "vg_gaussians_opacities",
     "vg_gaussians_sh",
+    "vg_gaussians_ply_size",
     "vg_gaussians_free",
     "vg_renderer_backend",
     "vg_renderer_choice",
@@ -242,6 +244,9 @@ fn what_cannot_fail_accepts_null() {
         assert_eq!(CStr::from_ptr(vg_version()).to_str(), Ok(env!("CARGO_PKG_VERSION")));
         assert_eq!(vg_abi_version(), VG_ABI_VERSION);
         assert_eq!(vg_error_code(null()), vg_status::Ok);
+        assert_eq!(CStr::from_ptr(vg_status_name(1)), c"VG_STATUS_ARGUMENT");
+        assert_eq!(CStr::from_ptr(vg_status_name(-7)), c"");
+        assert_eq!(vg_gaussians_ply_size(null()), 0);
         assert_eq!(CStr::from_ptr(vg_error_message(null())), c"");
         assert_eq!(CStr::from_ptr(vg_report_json(null())), c"");
         assert_eq!(vg_context_threads(null()), 0);
@@ -368,7 +373,12 @@ fn mirrors_scales_and_shears_are_no_poses() {
                 call.lent(argument).put(field, k, value.to_bits());
             }
         };
-        for make in [calls::camera_scale as fn(&World) -> Call, calls::camera_project, calls::render] {
+        for make in [
+            calls::camera_scale as fn(&World) -> Call,
+            calls::camera_project,
+            calls::camera_unproject_points,
+            calls::render,
+        ] {
             let words = refused("camera.vehicle_from_camera");
             table.row(make, &what, |call| put(call, "camera", "vehicle_from_camera"), words);
         }
@@ -380,6 +390,7 @@ fn mirrors_scales_and_shears_are_no_poses() {
         for (make, name) in [
             (calls::pose_from_colmap as fn(&World) -> Call, "vehicle_from_world"),
             (calls::pose_from_opengl, "vehicle_from_world"),
+            (calls::pose_from_opencv, "vehicle_from_world"),
             (calls::gaussians_transform, "to_from_vehicle"),
         ] {
             table.row(make, &what, |call| call.doubles(name).copy_from_slice(&matrix), refused(name));
@@ -425,6 +436,12 @@ fn numbers_that_overflow_are_refused_and_not_handed_out() {
     let at = vehicle::camera(-40.0, 6.5, 4, 4).center();
     table.row(calls::camera_project, "on the plane", point(at.to_array()), refused("point_vehicle"));
 
+    table.row(calls::pose_from_opencv, "far, then scaled", tvec, refused("pose"));
+    let turned = |call: &mut Call| call.doubles("rvec").fill(far);
+    table.row(calls::pose_from_opencv, "no angle", turned, refused("rvec"));
+    let depth = |call: &mut Call| call.set("depth_m", Value::Number(far.to_bits()));
+    table.row(calls::camera_unproject, "beyond all numbers", depth, refused("pixel"));
+
     // A float32 of 16 km does not resolve a millimetre.
     let utm = |call: &mut Call| call.doubles("to_from_vehicle")[3] = 5e6;
     table.row(calls::gaussians_transform, "UTM", utm, refused("to_from_vehicle"));
@@ -438,6 +455,76 @@ fn numbers_that_overflow_are_refused_and_not_handed_out() {
         let expect = Fails(vg_status::Argument, String::new());
         table.row(calls::gaussians_transform, &format!("scale {scale}"), matrix, expect);
     }
+}
+
+/// `f64`s of an out array after a call that worked.
+fn numbers(done: &Done, argument: usize) -> Vec<f64> {
+    done.memory[argument].as_ref().expect("memory").doubles()
+}
+
+#[test]
+fn points_without_a_pixel_and_pixels_without_a_point_are_nan_between_the_others() {
+    let table = Table::new();
+    let world = &table.world;
+    let mut call = calls::camera_project_points(world);
+    let behind = vehicle::camera(-40.0, 6.5, 4, 4).center() * 2.0;
+    let odd = [f64::NAN, 0.0, 0.0];
+    let given = [[0.5, -0.25, 0.5], behind.to_array(), odd, [-1.0, 0.25, 0.0]];
+    call.set("points", Value::Doubles(given.concat()));
+    call.set("count", Value::Number(4));
+    // Room that holds no finite numbers is not the table's kind of argument.
+    let (mut pixels, mut depths) = ([7.0; 8], [7.0; 4]);
+    call.set("out_pixels", Value::Handle(pixels.as_mut_ptr().expose_provenance()));
+    call.set("out_depths", Value::Handle(depths.as_mut_ptr().expose_provenance()));
+    assert!(call.run(true).is_ok());
+    assert!(pixels[2..6].iter().all(|v| v.is_nan()) && depths[1..3].iter().all(|v| v.is_nan()));
+    let one = calls::camera_project(world).run(true);
+    assert_eq!(pixels[..2], numbers(&one, 2)[..]);
+
+    let mut call = calls::camera_unproject_points(world);
+    call.set("pixels", Value::Doubles(pixels.to_vec()));
+    call.set("depths", Value::Doubles(depths.to_vec()));
+    call.set("count", Value::Number(4));
+    let mut points = [7.0; 12];
+    call.set("out_points", Value::Handle(points.as_mut_ptr().expose_provenance()));
+    assert!(call.run(true).is_ok());
+    assert!(points[3..9].iter().all(|v| v.is_nan()));
+    for (found, given) in points.iter().zip(given.concat()) {
+        assert!(found.is_nan() || (found - given).abs() < 1e-12, "{points:?}");
+    }
+}
+
+#[test]
+fn indices_and_files_in_memory_are_checked_to_the_last() {
+    let mut table = Table::new();
+    let indices = |values: [usize; 4]| {
+        move |call: &mut Call| {
+            let mut memory = Memory::of(&values, 0);
+            call.set("indices", Value::Handle(memory.pointer()));
+            call.inputs.push(memory);
+        }
+    };
+    let select = calls::gaussians_select;
+    table.row(select, "the last", indices([0, 1, 2, 2]), Fine);
+    table.row(select, "one beyond", indices([0, 1, 2, 3]), refused("indices[3]: 3"));
+    table.row(select, "far beyond", indices([usize::MAX, 0, 0, 0]), refused("indices[0]"));
+    let none = |call: &mut Call| {
+        call.set("indices", Value::Null);
+        call.set("index_count", Value::Number(0));
+    };
+    table.row(select, "none", none, Fine);
+
+    let load = calls::gaussians_load_ply_memory;
+    let whole = bytes(table.row(load, "as it is", |_| {}, Fine).handle("out"));
+    assert_eq!(whole, bytes(table.row(calls::gaussians_load_ply, "the file", |_| {}, Fine).handle("out")));
+    for size in [0, 3, 100] {
+        let cut = |call: &mut Call| call.set("size", Value::Number(size));
+        let told = Fails(vg_status::Format, "PLY in memory: ".into());
+        table.row(load, &format!("{size} bytes"), cut, told);
+    }
+    let mut save = calls::gaussians_save_ply_memory(&table.world);
+    assert!(save.run(true).is_ok());
+    assert_eq!(save.targets[0].memory.content(), std::fs::read(table.world.scratch.join("few.ply")).unwrap());
 }
 
 #[test]

@@ -4,7 +4,7 @@ use crate::tools::{STRICT, assert_golden, cc, cxx, have, root, run, scratch};
 use std::process::Command;
 
 /// The chapters of the header.
-const CHAPTERS: [&str; 18] = [
+const CHAPTERS: [&str; 21] = [
     "version",
     "status",
     "context",
@@ -15,7 +15,10 @@ const CHAPTERS: [&str; 18] = [
     "options",
     "report",
     "gaussians",
+    "select",
+    "placed",
     "reconstruct",
+    "refine",
     "render",
     "renderer",
     "gradient",

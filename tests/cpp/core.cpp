@@ -34,6 +34,26 @@ static_assert(only_moves<vg::Context> && only_moves<vg::Model> && only_moves<vg:
 static_assert(!std::is_convertible_v<vg::Result<int>, bool>, "a Result is a condition, not a number");
 static_assert(!std::is_convertible_v<vg_gaussians *, vg::Gaussians>, "taking a handle over is written down");
 
+/// Whether `place = value` compiles.
+template <class Place, class Value> constexpr bool takes = std::is_assignable_v<Place &, Value>;
+using Prior = decltype(vg::Options::prior);
+static_assert(takes<Prior, vg::Prior> && takes<Prior, vg_prior>);
+static_assert(!takes<Prior, vg_symmetry> && !takes<Prior, vg::Symmetry> && !takes<Prior, int>,
+              "the name of another choice is no prior");
+static_assert(!takes<decltype(vg::Options::symmetry), vg_prior> && !takes<decltype(vg::Options::keep), vg_prior> &&
+              !takes<decltype(vg::Options::calibrate), vg_relight> && !takes<decltype(vg::Options::relight), int> &&
+              !takes<decltype(vg::Options::refine_backend), vg_alpha> &&
+              !takes<decltype(vg::ModelOptions::provider), vg_prepack> &&
+              !takes<decltype(vg::ModelOptions::prepack), vg_provider> &&
+              !takes<decltype(vg::RefineOptions::backend), int> &&
+              !takes<decltype(vg::RenderOptions::backend), vg_format> &&
+              !takes<decltype(vg::RenderOptions::background), vg_alpha> &&
+              !takes<decltype(vg::RenderOptions::alpha), vg_background> &&
+              !takes<decltype(vg::RenderOptions::depth_mode), vg_alpha> &&
+              !takes<decltype(vg::RendererOptions::backend), vg_prior> &&
+              !takes<decltype(vg::ImageTarget::color_format), vg_prior> &&
+              !takes<decltype(vg::AlignOptions::heading), int>);
+
 struct Photographs {
     std::vector<std::uint8_t> rgb = ball_rgb();
     std::vector<std::uint8_t> mask = ball_mask();
@@ -59,6 +79,46 @@ void results_hold_a_value_or_an_error() {
     CHECK(done.ok() && done);
     done.take();
     CHECK(failed(vg::Result<void>(vg::Error{VG_STATUS_FORMAT, "odd"}), VG_STATUS_FORMAT, "odd"));
+}
+
+void a_value_may_be_replaced_where_there_is_none() {
+    const vg::Error gone{VG_STATUS_IO, "gone"};
+    const vg::Result<int> seven(7), no_number(gone);
+    CHECK(seven.value_or(1) == 7 && no_number.value_or(1) == 1);
+    vg::Result<vg::Context> none(gone);
+    const vg::Context instead = std::move(none).value_or(vg::Context::make(1).take());
+    CHECK(instead.threads() == 1);
+    CHECK(std::string(vg::status_name(no_number.error().status)) == "VG_STATUS_IO");
+    CHECK(std::string(vg::status_name(static_cast<vg_status>(1000))).empty());
+}
+
+void choices_are_the_numbers_of_the_c_structs() {
+    vg::Options options;
+    CHECK(options.prior == vg::Prior::Auto && options.prior == VG_PRIOR_AUTO && options.keep == vg::Keep::Nothing);
+    options.prior = vg::Prior::Hull;
+    options.symmetry = VG_SYMMETRY_NEVER;
+    options.keep = vg::Keep::Overlap | vg::Keep::ShBands;
+    const vg_options &in_c = options;
+    CHECK(in_c.prior == VG_PRIOR_HULL && in_c.symmetry == VG_SYMMETRY_NEVER);
+    CHECK(in_c.keep == (VG_KEEP_OVERLAP | VG_KEEP_SH_BANDS));
+
+    // A copy has fields of its own.
+    options.on_log = [](vg_log_level, const char *) {};
+    vg::Options copy = options;
+    CHECK(copy.prior == vg::Prior::Hull && copy.prior != VG_PRIOR_AUTO && copy.on_log);
+    copy.prior = vg::Prior::Shape;
+    CHECK(options.prior == vg::Prior::Hull && static_cast<vg_options &>(copy).prior == VG_PRIOR_SHAPE);
+    options = copy;
+    CHECK(in_c.prior == VG_PRIOR_SHAPE);
+    options.prior = vg::Options().prior;
+    CHECK(in_c.prior == VG_PRIOR_AUTO && copy.prior == vg::Prior::Shape);
+    const vg::Options moved = std::move(copy);
+    CHECK(moved.prior == vg::Prior::Shape && moved.on_log);
+
+    vg::RenderOptions picture;
+    picture.depth_mode = vg::DepthMode::Accumulated;
+    const vg::RenderOptions same_picture = picture;
+    CHECK(static_cast<const vg_render_options &>(same_picture).depth_mode == VG_DEPTH_MODE_ACCUMULATED);
 }
 
 /// How a program ends that takes a value which is not there.
@@ -128,6 +188,31 @@ void cameras_are_made_moved_scaled_and_cropped() {
     CHECK(vg::pose_from_opengl(vg::identity_pose).value()[5] == -1);
     CHECK(vg::pose_from_box(vg::identity_pose, pose_at_right()).value() == pose_at_right());
     CHECK(failed(vg::pose_from_colmap({0, 0, 0, 0}, {1, 2, 3}), VG_STATUS_ARGUMENT, "qvec"));
+}
+
+bool near(double a, double b) {
+    return std::abs(a - b) < 1e-9;
+}
+
+void cameras_look_at_points_and_points_go_to_pixels_and_back() {
+    const vg_camera camera = vg::look_at({0, -5, 1}, {0, 0, 1}, 90, 64, 48).take();
+    CHECK(near(camera.params[0], 24) && near(camera.vehicle_from_camera[7], -5));
+    const vg::Pose pose = vg::pose_look_at({0, -5, 1}, {0, 0, 1}).take();
+    const vg::Pose by_opencv = vg::pose_from_opencv({1.5707963267948966, 0, 0}, {0, 1, 5}).take();
+    for (std::size_t i = 0; i < 12; i++) {
+        CHECK(near(pose[i], camera.vehicle_from_camera[i]) && near(pose[i], by_opencv[i]));
+    }
+    const std::vector<vg::Point> points{{0.5, 0, 1}, {0, -9, 1}, {0, 0, 2}};
+    const vg::Projected seen = vg::project(camera, points).take();
+    CHECK(near(seen.pixels[0][0], 34.4) && near(seen.depths[2], 5) && std::isnan(seen.pixels[1][0]));
+    const std::vector<vg::Point> back = vg::unproject(camera, seen.pixels, seen.depths).take();
+    CHECK(near(back[0][0], 0.5) && std::isnan(back[1][2]) && near(back[2][2], 2));
+    CHECK(near(vg::unproject(camera, seen.pixels[2], 5).value()[2], 2));
+    CHECK(vg::project(camera, std::vector<vg::Point>{})->pixels.empty());
+    CHECK(failed(vg::unproject(camera, seen.pixels, {}), VG_STATUS_ARGUMENT, "depths: 0"));
+    CHECK(failed(vg::unproject(camera, vg::Pixel{1, 1}, 0), VG_STATUS_ARGUMENT, "depth_m"));
+    CHECK(failed(vg::look_at({0, 0, 1}, {0, 0, 0}, 90, 64, 48), VG_STATUS_ARGUMENT, "up: "));
+    CHECK(vg::look_at({0, 0, 1}, {0, 0, 0}, 90, 64, 48, {1, 0, 0}).ok());
 }
 
 vg::Reconstruction ball() {
@@ -261,6 +346,56 @@ void gaussians_are_saved_derived_and_made_of_arrays(const vg::Gaussians &car, co
     CHECK(vg::Gaussians::from_arrays(arrays)->size() == car.size());
     arrays.sh = nullptr;
     CHECK(failed(vg::Gaussians::from_arrays(arrays), VG_STATUS_ARGUMENT, "sh"));
+}
+
+void gaussians_are_selected_cropped_and_written_to_memory(const vg::Gaussians &car) {
+    const vg::Gaussians two = car.selected({1, 0}).take();
+    CHECK(two.size() == 2 && !(two.positions()[0] < car.positions()[3]) && !(two.positions()[0] > car.positions()[3]));
+    CHECK(failed(car.selected({car.size()}), VG_STATUS_ARGUMENT, "indices[0]"));
+    const double far = std::numeric_limits<double>::infinity();
+    const vg::Gaussians front = car.cropped({0, -far, -far}, {far, far, far}).take();
+    std::vector<std::uint8_t> keep;
+    for (std::size_t i = 0; i < car.size(); i++) {
+        keep.push_back(car.positions()[3 * i] >= 0);
+    }
+    CHECK(front.size() < car.size() && same(front, car.masked(keep).take()));
+    CHECK(failed(car.masked({1}), VG_STATUS_ARGUMENT, "keep_count: 1"));
+    CHECK(same(car, car.with_opacity_of(0).take()) && car.with_opacity_of(2)->empty());
+
+    const auto covariances = car.covariances().take();
+    const vg::Span<const float> scales = car.scales();
+    const double trace = covariances[0][0] + covariances[0][3] + covariances[0][5];
+    CHECK(near(trace, scales[0] * scales[0] + scales[1] * scales[1] + scales[2] * scales[2]));
+
+    const std::vector<std::uint8_t> file = car.to_ply().take();
+    const vg::Gaussians read = vg::Gaussians::from_ply(file).take();
+    CHECK(read.size() == car.size() && read.to_ply().take() == file);
+    CHECK(failed(vg::Gaussians::from_ply(file.data(), 100), VG_STATUS_FORMAT, "PLY in memory"));
+    CHECK(failed(vg::Gaussians().to_ply(), VG_STATUS_ARGUMENT, "gaussians"));
+
+    const std::vector<vg_camera> around = vg::turntable(car, 4, 64, 48).take();
+    CHECK(around.size() == 4 && around[0].vehicle_from_camera[3] > 1 && around[1].vehicle_from_camera[7] > 1);
+    CHECK(failed(vg::turntable(car, 0, 64, 48), VG_STATUS_ARGUMENT, "count: 0"));
+    CHECK(failed(vg::turntable(car, 1000000000, 64, 48), VG_STATUS_ARGUMENT, "count: 1000000000"));
+    CHECK(failed(vg::turntable(vg::Gaussians(), 3, 64, 48), VG_STATUS_ARGUMENT, "gaussians"));
+}
+
+void gaussians_are_refined(const vg::Gaussians &car) {
+    const Photographs photographs;
+    vg::RefineOptions options;
+    CHECK(options.iterations == 300 && options.backend == vg::Backend::Auto);
+    options.iterations = 4;
+    int calls = 0;
+    options.on_progress = [&calls](const char *, double) {
+        calls++;
+        return vg::Flow::Continue;
+    };
+    const vg::Refined refined = vg::refine(car, {photographs.view()}, options).take();
+    CHECK(refined.gaussians.size() == car.size() && refined.refinement.made == 4 && calls > 0);
+    CHECK(refined.refinement.psnr_after_db >= refined.refinement.psnr_before_db);
+    options.on_progress = [](const char *, double) { return vg::Flow::Cancel; };
+    CHECK(failed(vg::refine(car, {photographs.view()}, options), VG_STATUS_CANCELLED, ""));
+    CHECK(failed(vg::refine(vg::Gaussians(), {photographs.view()}), VG_STATUS_ARGUMENT, "gaussians"));
 }
 
 void pictures_own_their_pixels(const vg::Gaussians &car) {
@@ -400,16 +535,21 @@ int main(int argc, char **argv) {
     CHECK(argc == 2);
     CHECK(std::string(vg::version()).find('.') != std::string::npos);
     results_hold_a_value_or_an_error();
+    a_value_may_be_replaced_where_there_is_none();
+    choices_are_the_numbers_of_the_c_structs();
     taking_what_is_not_there_ends_the_program();
     handles_move_and_leave_nothing_behind();
     what_is_empty_is_harmless();
     cameras_are_made_moved_scaled_and_cropped();
+    cameras_look_at_points_and_points_go_to_pixels_and_back();
     callbacks_stop_a_reconstruction();
     a_cloud_is_lent();
     models_are_opened_and_lent();
     errors_name_the_argument();
     const vg::Reconstruction made = ball();
     gaussians_are_saved_derived_and_made_of_arrays(made.gaussians, argv[1]);
+    gaussians_are_selected_cropped_and_written_to_memory(made.gaussians);
+    gaussians_are_refined(made.gaussians);
     pictures_own_their_pixels(made.gaussians);
     gradients_own_their_numbers_and_a_loss_sees_the_picture(made.gaussians);
     models_are_measured(made.gaussians);

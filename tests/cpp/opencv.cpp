@@ -1,6 +1,7 @@
 // vg.hpp with OpenCV: what a cv::Mat may be, that it is not copied, that its channels arrive in their order.
 #include <opencv2/core.hpp>
 
+#include <limits>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -95,9 +96,33 @@ void other_types_are_errors_that_name_them(const Mats &mats) {
     CHECK(failed(vg::view(mats.bgr, mats.bgr, camera), VG_STATUS_ARGUMENT,
                  "mask: 64x64 of CV_8UC3, allowed: CV_8UC1"));
     CHECK(failed(vg::view(mats.bgr, mats.mask, millimetres, camera), VG_STATUS_ARGUMENT,
-                 "depth: 64x64 of CV_16UC1"));
+                 "depth: 64x64 of CV_16UC1, allowed: CV_32FC1 in metres (of other units: vg::metres)"));
+    const cv::Mat opacity(columns, columns, CV_32FC1);
+    CHECK(failed(vg::view(mats.bgr, opacity, camera), VG_STATUS_ARGUMENT, "of 0 to 1: mat.convertTo"));
     CHECK(failed(vg::view(mats.bgr, cube, camera), VG_STATUS_ARGUMENT, "mask: 3 dimensions of CV_8UC1"));
     CHECK(failed(vg::image_rgb(mats.mask), VG_STATUS_ARGUMENT, "allowed: CV_8UC3 (RGB)"));
+}
+
+void depth_in_millimetres_is_the_same_in_metres(const Mats &mats, const vg::Gaussians &car) {
+    // Whole millimetres, so that nothing is rounded away.
+    cv::Mat millimetres, whole;
+    mats.metres.convertTo(millimetres, CV_16U, 1000);
+    millimetres.convertTo(whole, CV_32F, 0.001);
+    const cv::Mat measured = vg::metres(millimetres).take();
+    CHECK(measured.type() == CV_32FC1 && !(cv::norm(measured, whole, cv::NORM_INF) > 0));
+    CHECK(!(cv::norm(measured, mats.metres, cv::NORM_INF) > 0.00051));
+    const vg_view view = vg::view(mats.bgr, mats.mask, measured, camera_at_right()).take();
+    CHECK(model(view).size() == car.size());
+
+    // Another sensor's unit, and floats.
+    const cv::Mat tenths = vg::metres(millimetres, 0.0001).take();
+    CHECK(!(cv::norm(10 * tenths, measured, cv::NORM_INF) > 1e-5));
+    CHECK(vg::metres(1000 * mats.metres)->type() == CV_32FC1);
+    for (const double odd : {0.0, -0.001, std::numeric_limits<double>::quiet_NaN(), 1e7}) {
+        CHECK(failed(vg::metres(millimetres, odd), VG_STATUS_ARGUMENT, "metres_per_unit: "));
+    }
+    CHECK(failed(vg::metres(mats.bgr), VG_STATUS_ARGUMENT, "depth: 64x64 of CV_8UC3, allowed: CV_16UC1"));
+    CHECK(failed(vg::metres(cv::Mat()), VG_STATUS_ARGUMENT, "depth: "));
 }
 
 void photographs_without_masks_are_lent(const Mats &mats) {
@@ -144,6 +169,43 @@ void pictures_go_into_matrices(const vg::Gaussians &car) {
     CHECK(untouched.empty());
 }
 
+/// Floats, alpha, and a renderer that draws many.
+void pictures_of_floats_and_of_renderers_go_into_matrices(const vg::Gaussians &car) {
+    const vg_camera camera = camera_at_right();
+    vg::RenderOptions transparent;
+    transparent.background = vg::Background::Transparent;
+    cv::Mat bytes, floats(columns, columns, CV_32FC4, cv::Scalar::all(7)), depth, alpha;
+    CHECK(vg::render_into(bytes, car, camera, transparent).ok());
+    const float *memory = floats.ptr<float>();
+    CHECK(vg::render_into(floats, depth, alpha, car, camera, transparent).ok());
+    CHECK(floats.ptr<float>() == memory && alpha.type() == CV_32FC1 && depth.type() == CV_32FC1);
+    // B G R A as the bytes are, to half a step of them.
+    cv::Mat rounded;
+    floats.convertTo(rounded, CV_8U, 255);
+    CHECK(!(cv::norm(rounded, bytes, cv::NORM_INF) > 1));
+    cv::Mat fourth;
+    cv::extractChannel(floats, fourth, 3);
+    CHECK(!(cv::norm(fourth, alpha, cv::NORM_INF) > 0));
+    CHECK(alpha.at<float>(columns / 2, columns / 2) > 0.8F && !(alpha.at<float>(0, 0) > 0));
+
+    const vg::Renderer renderer = vg::Renderer::make(car).take();
+    cv::Mat by_renderer, its_depth;
+    CHECK(vg::render_into(by_renderer, its_depth, renderer, camera, transparent).ok());
+    CHECK(!(cv::norm(by_renderer, bytes, cv::NORM_INF) > 0) && !(cv::norm(its_depth, depth, cv::NORM_INF) > 0));
+    std::vector<cv::Mat> pictures;
+    const vg_camera other = vg::placed(camera, {1, 0, 0, 0, 0, 0, 1, -5, 0, -1, 0, 0});
+    CHECK(vg::render_into(pictures, renderer, {camera, other}, transparent).ok());
+    CHECK(pictures.size() == 2 && !(cv::norm(pictures[0], bytes, cv::NORM_INF) > 0));
+    CHECK(cv::norm(pictures[1], bytes, cv::NORM_INF) > 0);
+
+    CHECK(failed(vg::render_into(alpha, renderer, camera), VG_STATUS_ARGUMENT,
+                 "color: 64x64 of CV_32FC1, allowed: 64x64 of CV_8UC3, CV_8UC4 or CV_32FC4, or empty"));
+    CHECK(failed(vg::render_into(bytes, depth, bytes, car, camera), VG_STATUS_ARGUMENT, "alpha: 64x64 of CV_8UC4"));
+    pictures.assign(1, alpha);
+    CHECK(failed(vg::render_into(pictures, renderer, {other, camera}), VG_STATUS_ARGUMENT, "color: "));
+    CHECK(pictures.size() == 1 && pictures[0].data == alpha.data);
+}
+
 void calibrations_are_taken_as_opencv_leaves_them() {
     const cv::Mat k = (cv::Mat_<double>(3, 3) << 100, 0, 31, 0, 110, 23.5, 0, 0, 1);
     const cv::Mat row = (cv::Mat_<double>(1, 5) << 0.1, 0.01, 0.001, 0.002, 0.003);
@@ -159,6 +221,12 @@ void calibrations_are_taken_as_opencv_leaves_them() {
               camera.params[4] < 0.1001);
         CHECK(camera.vehicle_from_camera[7] < -3.9);
     }
+    const cv::Vec3d rvec(1.5707963267948966, 0, 0);
+    const cv::Mat tvec = (cv::Mat_<float>(1, 3) << 0, 1, 5);
+    const vg::Pose pose = vg::pose_from_opencv(cv::Mat(rvec), tvec).take();
+    CHECK(pose[7] < -4.999 && pose[7] > -5.001 && pose[6] > 0.999);
+    CHECK(failed(vg::pose_from_opencv(k, tvec), VG_STATUS_ARGUMENT, "rvec: 3x3 of CV_64FC1"));
+    CHECK(failed(vg::pose_from_opencv(tvec, cv::Mat()), VG_STATUS_ARGUMENT, "tvec: "));
     CHECK(failed(vg::camera_from_opencv(row, row, vg::Lens::Standard, size), VG_STATUS_ARGUMENT,
                  "k: 5x1 of CV_64FC1"));
     CHECK(failed(vg::camera_from_opencv(k, k, vg::Lens::Standard, size), VG_STATUS_ARGUMENT,
@@ -173,8 +241,10 @@ int main() {
     const Mats mats;
     const vg::Gaussians car = the_same_bytes_in_every_layout(mats);
     other_types_are_errors_that_name_them(mats);
+    depth_in_millimetres_is_the_same_in_metres(mats, car);
     photographs_without_masks_are_lent(mats);
     pictures_go_into_matrices(car);
+    pictures_of_floats_and_of_renderers_go_into_matrices(car);
     calibrations_are_taken_as_opencv_leaves_them();
     return 0;
 }

@@ -166,8 +166,7 @@ impl Camera {
         let py = points.py();
         let points = rows::<3>(points, "points")?;
         let (mut pixels, mut depths) = (Vec::with_capacity(2 * points.len()), Vec::new());
-        for point in &points {
-            let seen = self.inner.pixel_and_depth((*point).into());
+        for seen in self.inner.pixels_and_depths(&points) {
             let (pixel, along) = seen.unwrap_or(([f64::NAN; 2], f64::NAN));
             pixels.extend(pixel);
             depths.push(along);

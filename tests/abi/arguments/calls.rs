@@ -821,7 +821,7 @@ const SIMILARITY: [f64; 16] =
 const POSE: [f64; 12] = [0.0, -1.0, 0.0, 4e5, 1.0, 0.0, 0.0, 5e6, 0.0, 0.0, 1.0, 100.0];
 
 /// A call that works, for each function that can fail.
-pub const CALLS: [fn(&World) -> Call; 56] = [
+pub const CALLS: [fn(&World) -> Call; 72] = [
     context_options_init,
     context_new,
     camera_init,
@@ -831,8 +831,15 @@ pub const CALLS: [fn(&World) -> Call; 56] = [
     camera_crop,
     pose_from_colmap,
     pose_from_opengl,
+    pose_from_opencv,
     pose_from_box,
     camera_project,
+    pose_look_at,
+    camera_look_at,
+    cameras_turntable,
+    camera_project_points,
+    camera_unproject,
+    camera_unproject_points,
     view_init,
     model_options_init,
     model_open,
@@ -846,7 +853,16 @@ pub const CALLS: [fn(&World) -> Call; 56] = [
     gaussians_transform,
     gaussians_mirror,
     gaussians_merge,
+    gaussians_select,
+    gaussians_mask,
+    gaussians_crop,
+    gaussians_covariances,
+    gaussians_load_ply_memory,
+    gaussians_save_ply_memory,
     reconstruct,
+    refine_options_init,
+    refinement_init,
+    refine,
     render_options_init,
     image_target_init,
     render,
@@ -881,7 +897,7 @@ pub const CALLS: [fn(&World) -> Call; 56] = [
 ];
 
 /// `sizeof` in the release that introduced them: no caller has shorter ones.
-pub const FIRST_SIZES: [(&str, usize); 20] = [
+pub const FIRST_SIZES: [(&str, usize); 22] = [
     ("vg_context_options", 16),
     ("vg_camera", 280),
     ("vg_view", 392),
@@ -889,6 +905,8 @@ pub const FIRST_SIZES: [(&str, usize); 20] = [
     ("vg_options", 96),
     ("vg_report_figures", 152),
     ("vg_gaussian_arrays", 64),
+    ("vg_refine_options", 64),
+    ("vg_refinement", 56),
     ("vg_render_options", 72),
     ("vg_renderer_options", 24),
     ("vg_image_target", 56),
@@ -930,6 +948,8 @@ init_of!(model_options_init, vg_model_options_init, "options", model_options());
 init_of!(options_init, vg_options_init, "options", options(0));
 init_of!(report_figures_init, vg_report_figures_init, "figures", figures());
 init_of!(gaussian_arrays_init, vg_gaussian_arrays_init, "arrays", arrays(0, [0; 5], 0));
+init_of!(refine_options_init, vg_refine_options_init, "options", refine_options(0));
+init_of!(refinement_init, vg_refinement_init, "refinement", refinement());
 init_of!(render_options_init, vg_render_options_init, "options", render_options(0));
 init_of!(renderer_options_init, vg_renderer_options_init, "options", renderer_options(0));
 init_of!(image_target_init, vg_image_target_init, "target", target([(0, 0); 3]));
@@ -1076,6 +1096,145 @@ pub fn camera_project(w: &World) -> Call {
         .argument("out_pixel", Value::OutDoubles(2))
 }
 
+pub fn pose_from_opencv(_: &World) -> Call {
+    Call::new("vg_pose_from_opencv", invoke!(vg_pose_from_opencv 0 1 2 3))
+        .argument("rvec", Value::Doubles(vec![0.3, -1.1, 0.7]))
+        .tries(finite())
+        .argument("tvec", Value::Doubles(vec![1.0, 2.0, 3.0]))
+        .tries(finite())
+        .argument("vehicle_from_world", Value::Doubles(SIMILARITY.to_vec()))
+        .nullable()
+        .tries(finite())
+        .argument("out", Value::OutDoubles(12))
+}
+
+/// Where a camera stands, what it looks at, what is up.
+fn sight(call: Call) -> Call {
+    call.argument("eye", Value::Doubles(vec![3.0, -4.0, 1.5]))
+        .tries(finite())
+        .argument("target", Value::Doubles(vec![0.1, 0.2, -0.3]))
+        .tries(finite())
+        .argument("up", Value::Doubles(vec![0.1, 0.0, 2.0]))
+        .nullable()
+        .tries(finite())
+}
+
+pub fn pose_look_at(_: &World) -> Call {
+    sight(Call::new("vg_pose_look_at", invoke!(vg_pose_look_at 0 1 2 3)))
+        .argument("out", Value::OutDoubles(12))
+}
+
+/// Bits of a number that a function takes by value, between these, neither included.
+fn between(low: f64, high: f64) -> Tries {
+    let bad = [low, high, -1e300, 1e300].map(|v| (v.to_bits(), Refused));
+    bad.into_iter().chain(finite()).collect()
+}
+
+pub fn camera_look_at(w: &World) -> Call {
+    let invoke: Invoke = |a, error| unsafe {
+        let fov_y_degrees = f64::from_bits(a[3] as u64);
+        vg_camera_look_at(
+            a[0] as _,
+            a[1] as _,
+            a[2] as _,
+            fov_y_degrees,
+            a[4] as _,
+            a[5] as _,
+            a[6] as _,
+            error,
+        )
+    };
+    sight(Call::new("vg_camera_look_at", invoke))
+        .argument("fov_y_degrees", Value::Number(40f64.to_bits()))
+        .tries(between(0.0, 180.0))
+        .argument("width", Value::Number(63))
+        .word("size")
+        .tries(sizes())
+        .argument("height", Value::Number(48))
+        .word("size")
+        .tries(sizes())
+        .argument("out", Value::OutStruct(w.camera()))
+}
+
+pub fn cameras_turntable(w: &World) -> Call {
+    let invoke: Invoke = |a, error| unsafe {
+        let [elevation_degrees, fov_y_degrees] = [a[2], a[3]].map(|bits| f64::from_bits(bits as u64));
+        let (width, height) = (a[4] as _, a[5] as _);
+        vg_cameras_turntable(
+            a[0] as _,
+            a[1] as _,
+            elevation_degrees,
+            fov_y_degrees,
+            width,
+            height,
+            a[6] as _,
+            error,
+        )
+    };
+    Call::new("vg_cameras_turntable", invoke)
+        .argument("gaussians", Value::Handle(w.gaussians))
+        .argument("count", Value::Number(3))
+        .tries(counts(&[0, 100_001, 1 << 60, u64::MAX]))
+        .argument("elevation_degrees", Value::Number(12f64.to_bits()))
+        .tries(within64(-89.0, 89.0))
+        .argument("fov_y_degrees", Value::Number(35f64.to_bits()))
+        .tries(between(0.0, 180.0))
+        .argument("width", Value::Number(63))
+        .word("size")
+        .tries(sizes())
+        .argument("height", Value::Number(48))
+        .word("size")
+        .tries(sizes())
+        .argument(
+            "out",
+            Value::OutStruct(Lent::new("vg_camera", &[w.photographs[0].camera; 3], camera_fields())),
+        )
+}
+
+/// Points on the vehicle, all in front of the camera.
+const POINTS: [f64; 6] = [0.5, -0.25, 0.5, -1.0, 0.25, 0.0];
+
+/// What no memory holds.
+fn too_many() -> Tries {
+    counts(&[1 << 60, u64::MAX])
+}
+
+pub fn camera_project_points(w: &World) -> Call {
+    Call::new("vg_camera_project_points", invoke!(vg_camera_project_points 0 1 2 3 4))
+        .argument("camera", Value::Struct(w.camera()))
+        .argument("points", Value::Doubles(POINTS.to_vec()))
+        .argument("count", Value::Number(2))
+        .word("points")
+        .tries(too_many())
+        .argument("out_pixels", Value::OutDoubles(4))
+        .argument("out_depths", Value::OutDoubles(2))
+        .nullable()
+}
+
+pub fn camera_unproject(w: &World) -> Call {
+    let invoke: Invoke = |a, error| unsafe {
+        vg_camera_unproject(a[0] as _, a[1] as _, f64::from_bits(a[2] as u64), a[3] as _, error)
+    };
+    Call::new("vg_camera_unproject", invoke)
+        .argument("camera", Value::Struct(w.camera()))
+        .argument("pixel", Value::Doubles(vec![10.0, 20.5]))
+        .tries(finite())
+        .argument("depth_m", Value::Number(4f64.to_bits()))
+        .tries([vec![(0, Refused), ((-1f64).to_bits(), Refused)], finite()].concat())
+        .argument("out_point", Value::OutDoubles(3))
+}
+
+pub fn camera_unproject_points(w: &World) -> Call {
+    Call::new("vg_camera_unproject_points", invoke!(vg_camera_unproject_points 0 1 2 3 4))
+        .argument("camera", Value::Struct(w.camera()))
+        .argument("pixels", Value::Doubles(vec![10.0, 20.5, 30.0, 5.0]))
+        .argument("depths", Value::Doubles(vec![4.0, 5.0]))
+        .argument("count", Value::Number(2))
+        .word("pixels")
+        .tries(too_many())
+        .argument("out_points", Value::OutDoubles(6))
+}
+
 fn figures() -> Lent {
     let fields = fields!(vg_report_figures {
         struct_size: elsewhere(),
@@ -1191,6 +1350,130 @@ pub fn gaussians_merge(w: &World) -> Call {
         .argument("first", Value::Handle(w.gaussians))
         .argument("second", Value::Handle(w.few))
         .argument("out", Value::OutHandle(Made::Gaussians))
+}
+
+pub fn gaussians_select(w: &World) -> Call {
+    let mut indices = Memory::of(&[2usize, 0, 2, 1], 0);
+    Call::new("vg_gaussians_select", invoke!(vg_gaussians_select 0 1 2 3))
+        .argument("gaussians", Value::Handle(w.few))
+        .argument("indices", Value::Handle(indices.pointer()))
+        .argument("index_count", Value::Number(4))
+        .word("indices")
+        .tries(too_many())
+        .argument("out", Value::OutHandle(Made::Gaussians))
+        .memory(vec![indices])
+}
+
+pub fn gaussians_mask(w: &World) -> Call {
+    let mut keep = Memory::of(&[1u8, 0, 255], 0);
+    Call::new("vg_gaussians_mask", invoke!(vg_gaussians_mask 0 1 2 3))
+        .argument("gaussians", Value::Handle(w.few))
+        .argument("keep", Value::Handle(keep.pointer()))
+        .argument("keep_count", Value::Number(3))
+        .tries(counts(&[0, 2, 4, 1 << 60, u64::MAX]))
+        .argument("out", Value::OutHandle(Made::Gaussians))
+        .memory(vec![keep])
+}
+
+pub fn gaussians_crop(w: &World) -> Call {
+    let infinite = |v: f64| vec![(v.to_bits(), Fine), (f64::NAN.to_bits(), Refused)];
+    Call::new("vg_gaussians_crop", invoke!(vg_gaussians_crop 0 1 2 3))
+        .argument("gaussians", Value::Handle(w.gaussians))
+        .argument("low", Value::Doubles(vec![-1.0, -0.5, -0.25]))
+        .tries([infinite(f64::NEG_INFINITY), vec![(2f64.to_bits(), Refused)]].concat())
+        .argument("high", Value::Doubles(vec![1.0, 0.5, 1.0]))
+        .word("low")
+        .tries([infinite(f64::INFINITY), vec![((-2f64).to_bits(), Refused)]].concat())
+        .argument("out", Value::OutHandle(Made::Gaussians))
+}
+
+pub fn gaussians_covariances(w: &World) -> Call {
+    let mut out = blank(1, 3 * 6 * 4, 3 * 6 * 4, 1, true);
+    let mut call = Call::new("vg_gaussians_covariances", invoke!(vg_gaussians_covariances 0 1 2))
+        .argument("gaussians", Value::Handle(w.few))
+        .argument("out", Value::Handle(out.memory.pointer()))
+        .argument("count", Value::Number(3))
+        .tries(counts(&[0, 2, 4, 1 << 60, u64::MAX]));
+    call.targets = vec![out];
+    call
+}
+
+/// The file of `few`.
+fn few_ply(w: &World) -> Vec<u8> {
+    std::fs::read(w.scratch.join("few.ply")).expect("saved with the world")
+}
+
+pub fn gaussians_load_ply_memory(w: &World) -> Call {
+    let bytes = few_ply(w);
+    let mut data = Memory::of(&bytes, 1);
+    Call::new("vg_gaussians_load_ply_memory", invoke!(vg_gaussians_load_ply_memory 0 1 2))
+        .argument("data", Value::Handle(data.pointer()))
+        .argument("size", Value::Number(bytes.len() as u64))
+        .word("data")
+        .tries(counts(&[1 << 63, u64::MAX]))
+        .argument("out", Value::OutHandle(Made::Gaussians))
+        .memory(vec![data])
+}
+
+pub fn gaussians_save_ply_memory(w: &World) -> Call {
+    let size = few_ply(w).len();
+    let mut buffer = blank(1, size, size, 1, false);
+    let mut call = Call::new("vg_gaussians_save_ply_memory", invoke!(vg_gaussians_save_ply_memory 0 1 2))
+        .argument("gaussians", Value::Handle(w.few))
+        .argument("buffer", Value::Handle(buffer.memory.pointer()))
+        .argument("size", Value::Number(size as u64))
+        .tries(counts(&[0, 1, size as u64 - 1]));
+    call.targets = vec![buffer];
+    call
+}
+
+fn refine_options(context: usize) -> Lent {
+    let fields = fields!(vg_refine_options {
+        struct_size: elsewhere(),
+        context: elsewhere(),
+        seconds: refine_seconds(),
+        iterations: [counts(&[1_000_001, u64::from(u32::MAX)]), vec![(0, Fine), (2, Fine)]].concat(),
+        hold_out: choice(&[0, 1]),
+        densify: choice(&[0, 1]),
+        backend: choice_without(&[0, 1], 2),
+        progress: elsewhere(),
+        progress_user: elsewhere(),
+        flags: reserved(),
+    });
+    let mut lent = Lent::zeroed::<vg_refine_options>("vg_refine_options", fields);
+    lent.put("context", 0, context as u64);
+    lent.put("iterations", 0, 1);
+    lent
+}
+
+fn refinement() -> Lent {
+    let fields = fields!(vg_refinement {
+        struct_size: elsewhere(),
+        iterations: elsewhere(),
+        made: elsewhere(),
+        kept: elsewhere(),
+        stop: elsewhere(),
+        psnr_before_db: elsewhere(),
+        psnr_after_db: elsewhere(),
+        held_out_before_db: elsewhere(),
+        held_out_after_db: elsewhere(),
+    });
+    Lent::zeroed::<vg_refinement>("vg_refinement", fields)
+}
+
+pub fn refine(w: &World) -> Call {
+    let (views, memory) = w.views();
+    Call::new("vg_refine", invoke!(vg_refine 0 1 2 3 4 5))
+        .argument("gaussians", Value::Handle(w.few))
+        .argument("views", Value::Struct(views))
+        .argument("view_count", Value::Number(4))
+        .tries(counts(&[0, 4097, 1 << 60, u64::MAX]))
+        .argument("options", Value::Struct(refine_options(w.context)))
+        .nullable()
+        .argument("out", Value::OutHandle(Made::Gaussians))
+        .argument("out_refinement", Value::OutStruct(refinement()))
+        .nullable()
+        .memory(memory)
 }
 
 fn model_options() -> Lent {

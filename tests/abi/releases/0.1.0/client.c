@@ -107,6 +107,8 @@ static void versions(void) {
     CHECK(vg_abi_version() == VG_ABI_VERSION);
     CHECK(vg_error_code(NULL) == VG_STATUS_OK);
     CHECK(strcmp(vg_error_message(NULL), "") == 0);
+    CHECK(strcmp(vg_status_name(VG_STATUS_FORMAT), "VG_STATUS_FORMAT") == 0);
+    CHECK(strcmp(vg_status_name(-1), "") == 0);
 }
 
 static void poses_and_cameras(void) {
@@ -157,6 +159,37 @@ static void poses_and_cameras(void) {
     DO(vg_camera_crop(&camera, 10, 8, 20, 16, &other, &error));
     CHECK(other.params[2] == 21.5 && other.params[3] == 16 && other.width == 20 && other.height == 16);
     FAILS(vg_camera_crop(&camera, 60, 0, 20, 16, &other, &error), VG_STATUS_ARGUMENT, "allowed");
+}
+
+/* Cameras that are placed by hand; points to pixels and back. */
+static void placed_cameras(void) {
+    const double eye[3] = {0, -5, 1}, target[3] = {0, 0, 1}, up[3] = {0, 0, 3};
+    const double rvec[3] = {1.5707963267948966, 0, 0}, tvec[3] = {0, 1, 5};
+    const double points[9] = {0.5, 0, 1, 0, -9, 1, 0, 0, 2}, pixel[2] = {32, 24};
+    double pose[12], by_opencv[12], pixels[6], depths[3], back[9], point[3];
+    vg_camera camera;
+    vg_error *error = NULL;
+    int i;
+
+    DO(vg_pose_look_at(eye, target, NULL, pose, &error));
+    CHECK(near_to(pose[0], 1, 1e-15) && near_to(pose[6], 1, 1e-15) && near_to(pose[9], -1, 1e-15) && pose[7] == -5);
+    /* The same place as OpenCV has it: x stays, y goes to z, z goes to -y. */
+    DO(vg_pose_from_opencv(rvec, tvec, NULL, by_opencv, &error));
+    for (i = 0; i < 12; i++) {
+        CHECK(near_to(pose[i], by_opencv[i], 1e-14));
+    }
+    DO(vg_camera_look_at(eye, target, up, 90, 64, 48, &camera, &error));
+    CHECK(near_to(camera.params[0], 24, 1e-12) && camera.params[2] == 32 && camera.params[3] == 24);
+    DO(vg_camera_project_points(&camera, points, 3, pixels, depths, &error));
+    CHECK(near_to(pixels[0], 32 + 24 * 0.1, 1e-12) && near_to(pixels[1], 24, 1e-12) && near_to(depths[0], 5, 1e-12));
+    CHECK(isnan(pixels[2]) && isnan(depths[1]) && near_to(pixels[5], 24 - 24 * 0.2, 1e-12));
+    DO(vg_camera_unproject_points(&camera, pixels, depths, 3, back, &error));
+    CHECK(near_to(back[0], 0.5, 1e-12) && isnan(back[3]) && near_to(back[8], 2, 1e-12));
+    DO(vg_camera_unproject(&camera, pixel, 5, point, &error));
+    CHECK(near_to(point[0], 0, 1e-12) && near_to(point[1], 0, 1e-12) && near_to(point[2], 1, 1e-12));
+    FAILS(vg_camera_unproject(&camera, pixel, -1, point, &error), VG_STATUS_ARGUMENT, "depth_m: -1");
+    FAILS(vg_pose_look_at(eye, eye, NULL, pose, &error), VG_STATUS_ARGUMENT, "target: ");
+    FAILS(vg_camera_look_at(eye, target, up, 180, 64, 48, &camera, &error), VG_STATUS_ARGUMENT, "fov_y_degrees: 180");
 }
 
 static vg_scene *open_sample(vg_context *context, told *heard) {
@@ -356,6 +389,96 @@ static void derive(const vg_gaussians *car) {
     vg_gaussians_free(copy);
     vg_gaussians_free(loaded);
     vg_gaussians_free(NULL);
+}
+
+/* Parts of a model, what is computed of it, and its file in memory. */
+static void parts(const vg_gaussians *car) {
+    const size_t n = vg_gaussians_count(car), some[3] = {2, 0, 2};
+    const size_t size = vg_gaussians_ply_size(car);
+    const float *p = vg_gaussians_positions(car), *s = vg_gaussians_scales(car);
+    const double low[3] = {0, -10, -10}, high[3] = {10, 10, 10};
+    uint8_t *keep = (uint8_t *)calloc(n, 1), *file = (uint8_t *)malloc(size);
+    float *covariances = (float *)malloc(n * 6 * sizeof(float));
+    vg_camera around[3];
+    vg_gaussians *part = NULL, *loaded = NULL;
+    vg_error *error = NULL;
+    size_t i, in_front = 0;
+
+    DO(vg_gaussians_select(car, some, 3, &part, &error));
+    CHECK(vg_gaussians_count(part) == 3 && memcmp(vg_gaussians_positions(part), p + 6, 3 * sizeof(float)) == 0);
+    vg_gaussians_free(part);
+    for (i = 0; i < n; i++) {
+        keep[i] = p[3 * i] >= 0;
+        in_front += keep[i];
+    }
+    DO(vg_gaussians_mask(car, keep, n, &part, &error));
+    CHECK(vg_gaussians_count(part) == in_front && in_front > 0 && in_front < n);
+    DO(vg_gaussians_crop(car, low, high, &loaded, &error));
+    CHECK(vg_gaussians_count(loaded) == in_front);
+    CHECK(memcmp(vg_gaussians_sh(loaded), vg_gaussians_sh(part), in_front * 27 * sizeof(float)) == 0);
+    vg_gaussians_free(part);
+    vg_gaussians_free(loaded);
+    FAILS(vg_gaussians_mask(car, keep, n - 1, &part, &error), VG_STATUS_ARGUMENT, "keep_count");
+    FAILS(vg_gaussians_crop(car, high, low, &part, &error), VG_STATUS_ARGUMENT, "low[0]");
+    FAILS(vg_gaussians_select(car, &n, 1, &part, &error), VG_STATUS_ARGUMENT, "indices[0]");
+
+    DO(vg_gaussians_covariances(car, covariances, n, &error));
+    for (i = 0; i < n; i++) { /* a rotation keeps the trace */
+        const double trace = (double)covariances[6 * i] + (double)covariances[6 * i + 3] + (double)covariances[6 * i + 5];
+        const double squares = pow((double)s[3 * i], 2) + pow((double)s[3 * i + 1], 2) + pow((double)s[3 * i + 2], 2);
+        CHECK(near_to(trace, squares, 1e-6 * squares));
+    }
+    FAILS(vg_gaussians_covariances(car, covariances, n + 1, &error), VG_STATUS_ARGUMENT, "count");
+
+    DO(vg_gaussians_save_ply_memory(car, file, size, &error));
+    DO(vg_gaussians_load_ply_memory(file, size, &loaded, &error));
+    CHECK(vg_gaussians_count(loaded) == n && memcmp(file, "ply\n", 4) == 0);
+    CHECK(memcmp(vg_gaussians_positions(loaded), p, n * 3 * sizeof(float)) == 0);
+    vg_gaussians_free(loaded);
+    FAILS(vg_gaussians_save_ply_memory(car, file, size - 1, &error), VG_STATUS_ARGUMENT, "size");
+    FAILS(vg_gaussians_load_ply_memory(file, size - 1, &loaded, &error), VG_STATUS_FORMAT, "PLY in memory");
+
+    DO(vg_cameras_turntable(car, 3, 12, 35, 64, 48, around, &error));
+    for (i = 0; i < 3; i++) {
+        CHECK(around[i].struct_size == sizeof around[i] && around[i].width == 64);
+    }
+    CHECK(around[0].vehicle_from_camera[3] > 3 && around[1].vehicle_from_camera[7] > 3);
+    FAILS(vg_cameras_turntable(car, 0, 12, 35, 64, 48, around, &error), VG_STATUS_ARGUMENT, "count: 0");
+    free(keep);
+    free(file);
+    free(covariances);
+}
+
+/* Moves the model's Gaussians towards the photographs. */
+static void refine(const vg_gaussians *car, const vg_view *views, size_t count, vg_context *context) {
+    vg_refine_options options;
+    vg_refinement done;
+    vg_gaussians *better = NULL;
+    vg_error *error = NULL;
+    told heard = {0, 0, 0, "", 0};
+
+    CHECK(vg_refine_options_init(&options, sizeof options) == VG_STATUS_OK);
+    CHECK(options.iterations == 300 && options.seconds == 0 && options.hold_out == 0 && options.densify == 0);
+    CHECK(options.backend == VG_BACKEND_AUTO && options.progress == NULL && options.progress_user == NULL);
+    options.context = context;
+    options.iterations = quick ? 1 : 8;
+    options.hold_out = 1;
+    options.progress = on_progress;
+    options.progress_user = &heard;
+    CHECK(vg_refinement_init(&done, sizeof done) == VG_STATUS_OK && isnan(done.psnr_after_db));
+    DO(vg_refine(car, views, count, &options, &better, &done, &error));
+    CHECK(vg_gaussians_count(better) == vg_gaussians_count(car) && heard.calls > 0 && heard.last_fraction <= 1);
+    CHECK(done.iterations == options.iterations && done.made == done.iterations && done.kept <= done.made);
+    CHECK(done.stop == VG_REFINE_STOP_DONE && done.psnr_after_db >= 15 && done.psnr_before_db >= 15);
+    CHECK(done.held_out_before_db >= 15 && done.held_out_after_db >= done.held_out_before_db);
+    vg_gaussians_free(better);
+
+    heard.calls = 0;
+    heard.stop_after = 1;
+    FAILS(vg_refine(car, views, count, &options, &better, NULL, &error), VG_STATUS_CANCELLED, "refine");
+    CHECK(better == NULL);
+    options.iterations = 1000001;
+    FAILS(vg_refine(car, views, count, &options, &better, &done, &error), VG_STATUS_ARGUMENT, "options.iterations");
 }
 
 enum { WIDTH = 160, HEIGHT = 120, CALLERS = 8 };
@@ -700,6 +823,7 @@ int main(int argc, char **argv) {
 
     versions();
     poses_and_cameras();
+    placed_cameras();
     CHECK(vg_context_options_init(&settings, sizeof settings) == VG_STATUS_OK);
     settings.threads = 2;
     DO(vg_context_new(&settings, &context, &error));
@@ -723,6 +847,8 @@ int main(int argc, char **argv) {
     print_hash("opacities", vg_gaussians_opacities(car), n * sizeof(float));
     print_hash("sh", vg_gaussians_sh(car), n * 27 * sizeof(float));
     derive(car);
+    parts(car);
+    refine(car, views, 4, context);
     render(car, &views[0].camera, context);
     align(views, 4, context);
     measure(car, &views[0], context);
