@@ -14,6 +14,7 @@ import pytest
 
 import vehicle_gaussians as vg
 from conftest import INPUTS, REPOSITORY, SEDAN, Views, looking_at_the_origin
+from vehicle_gaussians import capi
 from vehicle_gaussians._report import schema
 
 K = np.array([[600.0, 0, 319.5], [0, 610, 239.5], [0, 0, 1]])
@@ -227,3 +228,87 @@ def test_the_committed_schema_is_that_of_the_typed_report_and_holds_real_reports
     assert vg.Report.of(with_budget.report).plan.fits is False  # type: ignore[union-attr]
     # A newer library may say more.
     assert vg.Report.of({**sedan_made.report, "new": 1}) == typed
+
+
+def by_ctypes(gaussians: vg.Gaussians) -> capi.Gaussians:
+    return capi.Gaussians.from_arrays(*(getattr(gaussians, name) for name in ARRAYS))
+
+
+ARRAYS = ("means", "scales", "quats", "opacities", "sh")
+
+
+def same(ours: capi.Gaussians, theirs: vg.Gaussians) -> bool:
+    return all(getattr(ours, name).tobytes() == getattr(theirs, name).tobytes() for name in ARRAYS)
+
+
+def test_cameras_and_pixels_of_the_ctypes_face_are_those_of_the_extension(made: vg.Reconstruction) -> None:
+    theirs = vg.Camera.look_at((6, -4, 1.5), (0, 0, 0.7), 640, 480, fov_y_degrees=40, up=(0, 0.1, 1))
+    ours = capi.camera_look_at((6, -4, 1.5), (0, 0, 0.7), 640, 480, fov_y_degrees=40, up=(0, 0.1, 1))
+    assert np.array(ours.params)[:4].tolist() == theirs.params.tolist()
+    assert np.array(ours.vehicle_from_camera).reshape(3, 4).tolist() == theirs.vehicle_from_camera[:3].tolist()
+    points = made.gaussians.means.astype(float)
+    pixels, depths = capi.project(ours, points, depth=True)
+    assert pixels.tobytes() == theirs.project(points).tobytes() == capi.project(theirs, points).tobytes()
+    assert capi.unproject(ours, pixels, depths).tobytes() == theirs.unproject(pixels, depths).tobytes()
+    world = np.diag([0.5, 0.5, 0.5, 1.0])
+    for rvec, tvec in [(RVEC, TVEC), (RVEC[:, None], TVEC[:, None])]:
+        assert capi.pose_from_opencv(rvec, tvec, world).tobytes() == vg.pose_from_opencv(rvec, tvec, world).tobytes()
+    by_vectors = capi.camera_from_opencv(K, width=640, height=480, rvec=RVEC, tvec=TVEC)
+    expected = vg.Camera.from_opencv(K, width=640, height=480, rvec=RVEC, tvec=TVEC)
+    assert np.array(by_vectors.vehicle_from_camera).reshape(3, 4) == pytest.approx(expected.vehicle_from_camera[:3])
+    for call, words in [
+        (lambda: capi.camera_look_at((0, 0, 1), (0, 0, 1), 640, 480), "^target: .* where the camera stands"),
+        (lambda: capi.camera_from_opencv(K, width=640, height=480), "no whole pose"),
+        (lambda: capi.project(ours, [(1, 2)]), r"^points: shape \(1, 2\); allowed: an \(n, 3\) array"),
+        (lambda: capi.unproject(ours, [(1, 2)], [1, 2]), r"^depths: shape \(2,\)"),
+    ]:
+        with pytest.raises(vg.VgError, match=words):
+            call()  # type: ignore[no-untyped-call]
+
+
+def test_parts_and_files_of_the_ctypes_face_are_those_of_the_extension(made: vg.Reconstruction) -> None:
+    theirs = made.gaussians
+    ours = by_ctypes(theirs)
+    for index in (slice(None, None, 7), [5, 0, -1, 5], theirs.opacities > 0.5, []):
+        assert same(ours[index], theirs[index])  # type: ignore[index]
+    assert same(ours.cropped((0, -1, -1), (9, 9, 9)), theirs.cropped((0, -1, -1), (9, 9, 9)))
+    assert ours.covariances().tobytes() == theirs.covariances().tobytes()
+    assert ours.to_ply_bytes() == theirs.to_ply_bytes()
+    assert same(capi.Gaussians.from_ply_bytes(ours.to_ply_bytes()), vg.Gaussians.from_ply_bytes(theirs.to_ply_bytes()))
+    pairs = zip(ours.turntable(5, 64, 48), theirs.turntable(5, 64, 48), strict=True)
+    for mine, camera in pairs:
+        assert np.array(mine.vehicle_from_camera).reshape(3, 4).tolist() == camera.vehicle_from_camera[:3].tolist()
+    for call, words in [
+        (lambda: ours[3], "^index: int"),
+        (lambda: ours.cropped((0, 1, 0), (1, 0, 1)), r"^low\[1\]: 1 with"),
+        (lambda: ours.turntable(0, 64, 48), "^count: 0"),
+        (lambda: capi.Gaussians.from_ply_bytes("ply"), "^data: str; allowed: bytes"),  # type: ignore[arg-type]
+        (lambda: list(ours), "not iterable"),  # type: ignore[call-overload]
+    ]:
+        with pytest.raises((vg.VgError, TypeError), match=words):
+            call()
+
+
+def test_refinement_and_tables_of_the_ctypes_face_are_those_of_the_extension(
+    ellipsoid: Views, made: vg.Reconstruction
+) -> None:
+    lists = (ellipsoid.images, list(ellipsoid.masks), list(ellipsoid.depths), ellipsoid.cameras, list(INPUTS))
+    theirs = vg.refine(made.gaussians, vg.Scene(*lists), iterations=6, hold_out=True)
+    scene = capi.Scene(*lists)
+    ours = capi.refine(by_ctypes(made.gaussians), scene, iterations=6, hold_out=True)
+    assert same(ours.gaussians, theirs.gaussians)
+    for name in ("iterations", "made", "kept", "stop", "psnr_db"):
+        assert ours.report[name] == theirs.report[name], name
+    assert ours.report["held_out"]["psnr_db"] == theirs.report["held_out"]["psnr_db"]
+    assert capi.evaluate(by_ctypes(made.gaussians), scene) == vg.evaluate(made.gaussians, vg.Scene(*lists))
+    rows = capi.evaluate(by_ctypes(made.gaussians), SEDAN, INPUTS[:1])
+    assert len(rows) == 1 and rows[0].name.startswith("000")
+    for call, words in [
+        (lambda: capi.refine(ours.gaussians, scene, iterations=5, seconds=1.0), "^seconds: 1, with iterations 5"),
+        (lambda: capi.refine(ours.gaussians, scene, seconds=-1.0), "^seconds: -1"),
+        (lambda: capi.evaluate(ours.gaussians, scene, INPUTS), "^views, vehicle_from_world: given with an open scene"),
+    ]:
+        with pytest.raises(vg.VgError, match=words):
+            call()
+    with pytest.raises(vg.CancelledError):
+        capi.refine(ours.gaussians, scene, progress=lambda stage, fraction: False)
