@@ -34,6 +34,7 @@ ENUMERATIONS = {
     "vg_calibrate": capi.Calibrate,
     "vg_symmetry": capi.Symmetry,
     "vg_relight": capi.Relight,
+    "vg_refine_stop": capi.RefineStop,
     "vg_heading": capi.Heading,
     "vg_keep": capi.Keep,
     "vg_log_level": capi.LogLevel,

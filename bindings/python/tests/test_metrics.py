@@ -62,7 +62,8 @@ def test_pictures_of_another_range_are_refused_or_measured_in_theirs(face: Any, 
     a, b = ellipsoid.images[0], noisy(ellipsoid.images[0])
     expected = face.picture_errors(a, b)
     floats = [picture.astype(np.float32) for picture in (a, b)]
-    with pytest.raises(ValueError, match=r"^a(\[0, 0\]|, column 0, row 0): .*255.*; allowed: 0 to 1, and at most 1 beyond"):
+    words = r"^a(\[0, 0\]|, column 0, row 0): .*255.*; allowed: 0 to 1, and at most 1 beyond"
+    with pytest.raises(ValueError, match=words):
         face.picture_errors(*floats)
     with pytest.raises(ValueError, match="^b"):
         face.picture_errors(floats[0] / 255, np.where(floats[1] > 250, np.float32(-1.5), floats[1] / 255))

@@ -141,7 +141,11 @@ def haze(count: int) -> vg.Gaussians:
     means = np.stack([depth, 0 * depth, 0 * depth], axis=1)
     quats = np.tile(np.array([1, 0, 0, 0], np.float32), (count, 1))
     return vg.Gaussians.from_arrays(
-        means, np.full_like(means, 100.0), quats, np.full(count, 0.0045, np.float32), np.zeros((count, 1, 3), np.float32)
+        means,
+        np.full_like(means, 100.0),
+        quats,
+        np.full(count, 0.0045, np.float32),
+        np.zeros((count, 1, 3), np.float32),
     )
 
 
@@ -165,7 +169,15 @@ def ctrl_c_after(seconds: float) -> Iterator[list[float]]:
 
 
 #: Each would take minutes.
-LONG_CALLS = ["render", "render_planes", "render_backward", "render_many", "surface_errors", "view_errors", "align_scan"]
+LONG_CALLS = [
+    "render",
+    "render_planes",
+    "render_backward",
+    "render_many",
+    "surface_errors",
+    "view_errors",
+    "align_scan",
+]
 
 
 @pytest.mark.parametrize("face", FACES)
@@ -184,9 +196,11 @@ def test_ctrl_c_ends_every_long_call(face: Any, name: str, ellipsoid: Views, mad
         "render": lambda: model.render(camera),
         "render_planes": lambda: model.render_planes(camera),
         "render_backward": lambda: model.render_backward(camera, alpha=ones),
-        "render_many": lambda: drawn(vg, haze(20_000), 50 * [camera], None)
-        if face is vg
-        else capi.Renderer(model, "cpu").render(20 * [camera]),
+        "render_many": lambda: (
+            drawn(vg, haze(20_000), 50 * [camera], None)
+            if face is vg
+            else capi.Renderer(model, "cpu").render(20 * [camera])
+        ),
         "surface_errors": lambda: face.surface_errors(model, made.gaussians.means),
         "view_errors": lambda: face.view_errors(model, photograph, None, camera),
         "align_scan": lambda: aligned(face, ellipsoid, made, 500, None),

@@ -44,7 +44,9 @@ def test_depth_that_one_view_lacks_bends_the_shape_and_warns_of_the_callers_line
 @pytest.mark.parametrize("face", FACES)
 def test_a_budget_that_was_not_kept_warns(face: Any, ellipsoid: Views) -> None:
     views = (ellipsoid.images, ellipsoid.masks, ellipsoid.cameras)
-    with pytest.warns(vg.VgWarning, match=r"^budget: 0\.0001 s was not kept: the call took \d+\.\d\d s, though all") as caught:
+    with pytest.warns(
+        vg.VgWarning, match=r"^budget: 0\.0001 s was not kept: the call took \d+\.\d\d s, though all"
+    ) as caught:
         made = face.reconstruct(*views, budget=1e-4)
     assert [warning.filename for warning in caught] == [__file__]
     assert [str(warning.message) for warning in caught] == made.report["warnings"]

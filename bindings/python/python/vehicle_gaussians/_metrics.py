@@ -28,7 +28,8 @@ def picture_errors(
 
     What their alpha leaves open is white. data_range: what white is in both, where it is not 255 in bytes and 1 in
     floats; floats that are more than 1 beyond their range are an error, since clamped they would be equal.
-    lpips: the network that measures LPIPS, made by ``python -m vehicle_gaussians.export.lpips``. threads: worker threads; 0 means one per core.
+    lpips: the network that measures LPIPS, made by ``python -m vehicle_gaussians.export.lpips``.
+    threads: worker threads; 0 means one per core.
 
     >>> picture_errors(image, image).psnr_db
     inf

@@ -40,8 +40,8 @@ def refine(
 ) -> Refined:
     """Moves the Gaussians of any model until their pictures are the photographs of a scene.
 
-    Nothing is known of which mirrors which: each goes its own way. ``reconstruct`` with ``refine_iterations`` keeps both
-    sides mirror images.
+    Nothing is known of which mirrors which: each goes its own way. ``reconstruct`` with ``refine_iterations`` keeps
+    both sides mirror images.
 
     gaussians: in the frame of the scene's cameras.
     scene: of ``open_scene``, or ``Scene(images, masks, depths, cameras, names)``.

@@ -347,7 +347,7 @@ class Report:
 
     @classmethod
     def of(cls, report: Mapping[str, Any]) -> Report:
-        """The report that ``reconstruct`` returns or the program writes. What a newer library says beside is left out."""
+        """The report that ``reconstruct`` returns or the program writes, without what only a newer library says."""
         return _made(cls, report)
 
 
@@ -385,7 +385,8 @@ def _schema_of_class(kind: type[Any], definitions: dict[str, Any]) -> dict[str, 
         "description": (kind.__doc__ or "").split("\n\n")[0],
         "type": "object",
         "properties": {
-            name: {"description": " ".join(texts[name].split()), **_schema_of(hints[name], definitions)} for name in names
+            name: {"description": " ".join(texts[name].split()), **_schema_of(hints[name], definitions)}
+            for name in names
         },
         "required": names,
         "additionalProperties": False,

@@ -885,8 +885,8 @@ def camera_from_opencv(
     tvec: npt.ArrayLike | None = None,
     vehicle_from_world: npt.ArrayLike | None = None,
 ) -> vg_camera:
-    """A camera of OpenCV's calibration, which puts the centre of the top-left pixel at (0, 0); the arguments are those of
-    vehicle_gaussians.Camera.from_opencv."""
+    """A camera of OpenCV's calibration, which puts the centre of the top-left pixel at (0, 0); the arguments are those
+    of vehicle_gaussians.Camera.from_opencv."""
     k, bent = doubles(K, "K", (3, 3)), doubles(distortion, "distortion")
     if vehicle_from_camera is None and rvec is not None and tvec is not None:
         vehicle_from_camera = pose_from_opencv(rvec, tvec, vehicle_from_world)
