@@ -1,5 +1,12 @@
 //! How work runs: on threads that the caller started, with a progress callback that may cancel.
 
+mod course;
+mod watch;
+
+pub(crate) use course::Course;
+pub(crate) use watch::UNWATCHED;
+pub use watch::{ASKED_EVERY, Watch};
+
 use crate::error::{Error, Result};
 use std::cell::RefCell;
 use std::ops::ControlFlow;
@@ -14,11 +21,13 @@ pub struct Progress {
     pub stage: &'static str,
     /// Part of the stage that is done, 0 to 1.
     pub fraction: f64,
+    /// Part of the whole call that is done, in expected time: it never falls, and is 1 in the last call.
+    pub overall: f64,
     /// What an optimisation has come down to, where the stage is one.
     pub loss: Option<f64>,
 }
 
-/// Called on the caller's own thread at every stage boundary and inside the long ones; `Break` cancels.
+/// Called on the caller's own thread at every stage boundary, inside the long ones, and at the end; `Break` cancels.
 pub type ProgressCallback<'a> = dyn FnMut(Progress) -> ControlFlow<()> + 'a;
 
 /// Worker threads of the caller's own, started once and used by any number of calls, one after another or at
@@ -130,12 +139,13 @@ impl Drop for Threads {
 pub struct Context<'a> {
     threads: &'a Threads,
     callback: RefCell<&'a mut ProgressCallback<'a>>,
+    course: RefCell<Course>,
 }
 
 impl<'a> Context<'a> {
     /// For one run on these threads.
     pub fn new(threads: &'a Threads, callback: &'a mut ProgressCallback<'a>) -> Self {
-        Self { threads, callback: RefCell::new(callback) }
+        Self { threads, callback: RefCell::new(callback), course: RefCell::default() }
     }
 
     /// How many worker threads.
@@ -148,14 +158,27 @@ impl<'a> Context<'a> {
         self.threads.run(work)
     }
 
+    /// What is to come, for the overall fraction of what is told from now on.
+    pub(crate) fn follow(&self, course: Course) {
+        self.course.replace(course);
+    }
+
     /// Tells the caller where the run stands; an error if the caller wants it to stop.
     pub fn report(&self, stage: &'static str, fraction: f64) -> Result<()> {
-        self.tell(Progress { stage, fraction, loss: None })
+        let overall = self.course.borrow_mut().overall(stage, fraction);
+        self.tell(Progress { stage, fraction, overall, loss: None })
     }
 
     /// The same of an optimisation.
     pub fn report_loss(&self, stage: &'static str, fraction: f64, loss: f64) -> Result<()> {
-        self.tell(Progress { stage, fraction, loss: Some(loss) })
+        let overall = self.course.borrow_mut().overall(stage, fraction);
+        self.tell(Progress { stage, fraction, overall, loss: Some(loss) })
+    }
+
+    /// Tells the caller that all is done, in the stage that was told last.
+    pub(crate) fn report_end(&self) -> Result<()> {
+        let stage = self.course.borrow().stage();
+        self.tell(Progress { stage, fraction: 1.0, overall: 1.0, loss: None })
     }
 
     fn tell(&self, progress: Progress) -> Result<()> {

@@ -109,8 +109,8 @@ fn a_size_of_another_vehicle_is_refused_and_one_that_is_a_little_off_is_told() {
     }
     let report = made([length - 0.4, width, height]).unwrap().report;
     assert!(report.working_box.unwrap().contradicted_m > 0.1, "{:?}", report.working_box);
-    assert!(report.warnings().iter().any(|w| w.contains("contradict each other")), "{:?}", report.warnings());
-    assert!(made(true_size()).unwrap().report.warnings().is_empty());
+    assert!(report.warnings.iter().any(|w| w.contains("contradict each other")), "{:?}", report.warnings);
+    assert!(made(true_size()).unwrap().report.warnings.is_empty());
 }
 
 #[test]

@@ -5,6 +5,7 @@ use super::silhouettes::{Outline, coarse};
 use super::solve::descend;
 use crate::error::{Error, Result};
 use crate::geometry::Similarity;
+use crate::progress::Watch;
 use glam::{DMat3, DVec3};
 use nalgebra::Matrix3;
 use rayon::prelude::*;
@@ -25,7 +26,12 @@ const BENDS_PX: [f64; 2] = [30.0, 4.0];
 const SAME_TURN: f64 = 0.3;
 
 /// The best coarse alignments, best first, each another way round.
-pub(super) fn find(outlines: &[Outline], scan: &Scan, ground: Option<DVec3>) -> Result<Vec<Similarity>> {
+pub(super) fn find(
+    outlines: &[Outline],
+    scan: &Scan,
+    ground: Option<DVec3>,
+    watch: &Watch,
+) -> Result<Vec<Similarity>> {
     let middle = middle(outlines)?;
     let scale = scale(outlines, scan, middle)?;
     let starts: Vec<Similarity> = ups(outlines, ground)
@@ -39,7 +45,7 @@ pub(super) fn find(outlines: &[Outline], scan: &Scan, ground: Option<DVec3>) -> 
         .collect();
     let outlines: Vec<&Outline> = outlines.iter().step_by(outlines.len().div_ceil(VIEWS)).collect();
     let fit = |start: &Similarity| {
-        let fit = |s, bend| descend(s, scan.center, STEPS, |s| coarse(&outlines, scan, s, bend)).0;
+        let fit = |s, bend| descend(s, scan.center, STEPS, watch, |s| coarse(&outlines, scan, s, bend)).0;
         let found = BENDS_PX.into_iter().fold(*start, fit);
         (coarse(&outlines, scan, &found, BENDS_PX[1]).cost, found)
     };

@@ -1,8 +1,9 @@
 //! A scene on disk to a scan on disk.
 
-use super::{FEWEST_VIEWS, Heading, ScanAlignment, to_scan};
+use super::{FEWEST_VIEWS, Heading, ScanAlignment, to_scan_watched};
 use crate::error::{Error, Result};
 use crate::io::{self, MaskedViews};
+use crate::progress::{UNWATCHED, Watch};
 use crate::scene::Cloud;
 use std::path::{Path, PathBuf};
 
@@ -29,17 +30,29 @@ pub fn masks_of(folder: &Path) -> Result<MaskedViews> {
     Ok(scene)
 }
 
-/// [`to_scan`] with the masks, the sparse points and the scan (PLY, metres, vehicle frame) of files; the masks come
+/// [`to_scan`](super::to_scan) with the masks, the sparse points and the scan (PLY, metres, vehicle frame) of files; the masks come
 /// with the result. `scan` as in [`scan_of`].
 pub fn folder_to_scan(
     folder: &Path,
     scan: Option<&Path>,
     heading: Heading,
 ) -> Result<(MaskedViews, ScanAlignment)> {
+    folder_to_scan_watched(folder, scan, heading, &UNWATCHED)
+}
+
+/// As [`folder_to_scan`], under `watch`.
+pub fn folder_to_scan_watched(
+    folder: &Path,
+    scan: Option<&Path>,
+    heading: Heading,
+    watch: &Watch,
+) -> Result<(MaskedViews, ScanAlignment)> {
     let path = scan_of(folder, scan)?;
     let (points, _) = io::ply::read_points(&path)?;
     let cloud = Cloud::new(points).map_err(|e| Error::format(&path, "vertex", e.to_string()))?;
+    watch.check()?;
     let scene = masks_of(folder)?;
-    let found = to_scan(&scene.views, &scene.points, &cloud, heading)?;
+    watch.check()?;
+    let found = to_scan_watched(&scene.views, &scene.points, &cloud, heading, watch)?;
     Ok((scene, found))
 }

@@ -1,6 +1,7 @@
 //! Points on the visual hull of the masks, in upright coordinates of the world: how far the vehicle reaches.
 
 use super::silhouettes::Outline;
+use crate::progress::Watch;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -20,11 +21,12 @@ pub(super) fn surface(
     upright_from_world: DMat3,
     middle: DVec3,
     half: f64,
+    watch: &Watch,
 ) -> (Vec<DVec3>, f64) {
     let world_from_upright = upright_from_world.transpose();
     let low = upright_from_world * middle - DVec3::splat(half);
     let cell = 2.0 * half / CELLS as f64;
-    let inside = |p: DVec3| is_inside(outlines, world_from_upright * p);
+    let inside = |p: DVec3| !watch.is_stopped() && is_inside(outlines, world_from_upright * p);
     let at =
         |i: usize| DVec3::new((i % CELLS) as f64, (i / CELLS % CELLS) as f64, (i / CELLS / CELLS) as f64);
     let filled: Vec<bool> =

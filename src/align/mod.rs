@@ -17,10 +17,10 @@ mod solve;
 mod to_box;
 mod to_scan;
 
-pub use folder::{folder_to_scan, masks_of, scan_of};
+pub use folder::{folder_to_scan, folder_to_scan_watched, masks_of, scan_of};
 pub use heading::Heading;
-pub use to_box::{BoxAlignment, to_box};
-pub use to_scan::{LEAST_CONFIDENCE, ScanAlignment, to_scan};
+pub use to_box::{BoxAlignment, to_box, to_box_watched};
+pub use to_scan::{LEAST_CONFIDENCE, ScanAlignment, to_scan, to_scan_watched};
 
 use crate::error::{Error, Result};
 use crate::scene::View;

@@ -4,6 +4,7 @@
 //! scan, so that turn, move and scale hardly depend on each other.
 
 use crate::geometry::Similarity;
+use crate::progress::Watch;
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Cholesky, SMatrix, SVector};
 
@@ -82,6 +83,7 @@ pub(super) fn descend(
     start: Similarity,
     center: DVec3,
     steps: usize,
+    watch: &Watch,
     system: impl Fn(&Similarity) -> System,
 ) -> (Similarity, f64) {
     const TRIALS: usize = 5;
@@ -90,6 +92,9 @@ pub(super) fn descend(
     let mut at = system(&best);
     let mut damping = 1e-3;
     for _ in 0..steps {
+        if watch.is_stopped() {
+            break;
+        }
         let mut gained = None;
         for _ in 0..TRIALS {
             let Some(step) = at.step(damping) else { break };

@@ -6,6 +6,7 @@ use super::heading::{Heading, asked_view, is_contrary, unknown};
 use super::{candidates, check_sparse, ground, hull, nowhere, outlines};
 use crate::error::{Error, Result};
 use crate::geometry::Similarity;
+use crate::progress::{UNWATCHED, Watch};
 use crate::scene::View;
 use glam::{DMat3, DVec2, DVec3};
 use std::f64::consts::FRAC_PI_2;
@@ -19,6 +20,16 @@ const SIDES_M: std::ops::RangeInclusive<f64> = 0.2..=30.0;
 
 /// A box whose sides fit worse than this share of its longest is not of this vehicle.
 const WORST_SHARE: f64 = 0.15;
+
+/// Which part of the work is done after each step, by the time that it takes.
+const DONE: Done = Done { outlines: 0.2, ground: 0.4, hull: 0.95 };
+
+/// See [`DONE`].
+struct Done {
+    outlines: f64,
+    ground: f64,
+    hull: f64,
+}
 
 /// A similarity found with a box, and how well it fits.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,12 +59,27 @@ pub struct BoxAlignment {
 /// A size that is no vehicle's, too few masks, no ground among the points, [`Heading::Auto`], and a hull of other
 /// proportions.
 pub fn to_box(views: &[View], sparse: &[DVec3], size: [f64; 3], heading: Heading) -> Result<BoxAlignment> {
+    to_box_watched(views, sparse, size, heading, &UNWATCHED)
+}
+
+/// As [`to_box`], under `watch`.
+///
+/// # Errors
+/// Those of [`to_box`], and [`Error::Cancelled`].
+pub fn to_box_watched(
+    views: &[View],
+    sparse: &[DVec3],
+    size: [f64; 3],
+    heading: Heading,
+    watch: &Watch,
+) -> Result<BoxAlignment> {
     if !size.iter().all(|side| SIDES_M.contains(side)) {
         let allowed = format!("length, width and height of {} to {} m", SIDES_M.start(), SIDES_M.end());
         return Err(Error::argument("size", format!("{size:?}"), allowed));
     }
     check_sparse(sparse)?;
     let outlines = outlines(views)?;
+    watch.report(DONE.outlines)?;
     let Some((on_ground, up)) = ground::plane(sparse, &outlines) else {
         let found = format!("{} points that show no ground", sparse.len());
         return Err(Error::argument("sparse", found, "points of a level ground around the vehicle"));
@@ -63,7 +89,10 @@ pub fn to_box(views: &[View], sparse: &[DVec3], size: [f64; 3], heading: Heading
     let radii =
         outlines.iter().filter_map(|o| Some(o.angular_radius()? * o.pose().translation.distance(middle)));
     let radii: Vec<f64> = radii.collect();
-    let (points, between) = hull::surface(&outlines, upright, middle, CUBE * super::scan::median(&radii));
+    watch.report(DONE.ground)?;
+    let half = CUBE * super::scan::median(&radii);
+    let (points, between) = hull::surface(&outlines, upright, middle, half, watch);
+    watch.report(DONE.hull)?;
     let ground = up.dot(on_ground);
     let points: Vec<DVec3> = points.into_iter().filter(|p| p.z > ground).collect();
     if points.is_empty() {

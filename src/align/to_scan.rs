@@ -7,6 +7,7 @@ use super::silhouettes::Outline;
 use super::{candidates, check_sparse, ground, icp, nowhere, outlines, silhouettes, solve};
 use crate::error::Result;
 use crate::geometry::Similarity;
+use crate::progress::{UNWATCHED, Watch};
 use crate::scene::{Cloud, View};
 use glam::DVec3;
 
@@ -46,6 +47,17 @@ const CHECK: &str = "that the scan is of this vehicle and in metres";
 /// Least [`ScanAlignment::confidence`] for which front and back are told apart.
 pub const LEAST_CONFIDENCE: f64 = 0.1;
 
+/// Which part of the work is done after each step, by the time that it takes.
+const DONE: Done = Done { outlines: 0.05, scan: 0.1, candidates: 0.4, tried: 0.8 };
+
+/// See [`DONE`].
+struct Done {
+    outlines: f64,
+    scan: f64,
+    candidates: f64,
+    tried: f64,
+}
+
 /// A similarity found with a scan, and how well it fits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScanAlignment {
@@ -79,20 +91,37 @@ pub struct ScanAlignment {
 /// Fewer than [`super::FEWEST_VIEWS`] masks, a scan without surface or not of a vehicle's size, an outline that nowhere
 /// fits the masks, and front and back that cannot be told apart under [`Heading::Auto`].
 pub fn to_scan(views: &[View], sparse: &[DVec3], scan: &Cloud, heading: Heading) -> Result<ScanAlignment> {
+    to_scan_watched(views, sparse, scan, heading, &UNWATCHED)
+}
+
+/// As [`to_scan`], under `watch`.
+///
+/// # Errors
+/// Those of [`to_scan`], and [`Error::Cancelled`](crate::Error::Cancelled).
+pub fn to_scan_watched(
+    views: &[View],
+    sparse: &[DVec3],
+    scan: &Cloud,
+    heading: Heading,
+    watch: &Watch,
+) -> Result<ScanAlignment> {
     check_sparse(sparse)?;
     let outlines = outlines(views)?;
+    watch.report(DONE.outlines)?;
     let scan = Scan::new(scan)?;
+    watch.report(DONE.scan)?;
     let up = ground::plane(sparse, &outlines).map(|ground| ground.1);
-    let starts = candidates::find(&outlines, &scan, up)?;
+    let starts = candidates::find(&outlines, &scan, up, watch)?;
+    watch.report(DONE.candidates)?;
     let points = icp::of_vehicle(sparse, &outlines);
 
     let thin: Vec<DVec3> = scan.points.iter().step_by(THINNED).copied().collect();
     let tried = |s: Similarity| {
-        let s = refine(&outlines, &scan, &thin, &points, s, &ROUNDS[..FIRST_ROUNDS]);
+        let s = refine(&outlines, &scan, &thin, &points, s, &ROUNDS[..FIRST_ROUNDS], watch);
         (s, silhouettes::misses(&outlines, &thin, &s, COMPARED_PX).mean_px)
     };
     let finished = |s: Similarity| {
-        let s = refine(&outlines, &scan, &scan.points, &points, s, &ROUNDS[FIRST_ROUNDS..]);
+        let s = refine(&outlines, &scan, &scan.points, &points, s, &ROUNDS[FIRST_ROUNDS..], watch);
         (s, silhouettes::misses(&outlines, &scan.points, &s, COMPARED_PX))
     };
     let first: Vec<(Similarity, f64)> = starts.into_iter().take(TRIED).map(tried).collect();
@@ -105,7 +134,9 @@ pub fn to_scan(views: &[View], sparse: &[DVec3], scan: &Cloud, heading: Heading)
     let exactly = turned(&best, scan.center);
     let opposite = first.iter().copied().chain([tried(exactly)]).filter(|f| is_opposite(&f.0));
     let other = best_of(opposite).unwrap_or(exactly);
+    watch.report(DONE.tried)?;
     let mut both = [finished(best), finished(other)];
+    watch.check()?;
     // All points may judge otherwise than every fourth.
     both.sort_by(|a, b| a.1.mean_px.total_cmp(&b.1.mean_px));
     let [(best, misses), (other, other_misses)] = both;
@@ -155,6 +186,7 @@ fn refine(
     sparse: &[DVec3],
     start: Similarity,
     rounds: &[(f64, f64, f64)],
+    watch: &Watch,
 ) -> Similarity {
     let edges: usize = outlines.iter().map(Outline::edge_count).sum();
     let weight = POINTS_SHARE * edges as f64 / sparse.len().max(1) as f64;
@@ -164,7 +196,7 @@ fn refine(
             let points = icp::system(sparse, scan, s, near, POINT_NOISE_M, weight.min(1.0));
             solve::System::sum([edges, points])
         };
-        solve::descend(s, scan.center, STEPS, system).0
+        solve::descend(s, scan.center, STEPS, watch, system).0
     };
     rounds.iter().fold(start, round)
 }

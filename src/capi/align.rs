@@ -4,9 +4,11 @@ use super::camera;
 use super::context::{in_context, vg_context};
 use super::guard::guarded;
 use super::image;
+use super::options::vg_progress_fn;
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
 use super::view::vg_view;
+use super::watched::{Told, watched};
 use crate::align::{self, Heading};
 use crate::error::{Error, Result};
 use crate::geometry::Similarity;
@@ -14,7 +16,7 @@ use crate::scene::View;
 use crate::scene::cloud::{Cloud, MAX_CLOUD_POINTS};
 use crate::scene::view::MAX_VIEWS;
 use glam::DVec3;
-use std::ffi::c_char;
+use std::ffi::{c_char, c_void};
 
 /// How front and back are told apart.
 #[repr(i32)]
@@ -41,6 +43,10 @@ pub struct vg_align_options {
     pub heading: i32,
     /// Reserved: 0.
     pub flags: u32,
+    /// Called in the course of the call, see `vg_progress_fn`. NULL: none.
+    pub progress: vg_progress_fn,
+    /// Handed to `progress`.
+    pub progress_user: *mut c_void,
 }
 
 unsafe impl Versioned for vg_align_options {
@@ -53,6 +59,8 @@ unsafe impl Versioned for vg_align_options {
             context: std::ptr::null_mut(),
             heading: vg_heading::Auto as i32,
             flags: 0,
+            progress: None,
+            progress_user: std::ptr::null_mut(),
         }
     }
 }
@@ -149,7 +157,9 @@ pub unsafe extern "C" fn vg_align_scan(
             let options = read::optional("options", options)?;
             let heading = options.heading()?;
             let found = in_context(options.context, |shop| {
-                shop.threads.run(|| align::to_scan(&views, &sparse, &scan, heading))
+                watched(shop, "align", options.progress(), |watch| {
+                    align::to_scan_watched(&views, &sparse, &scan, heading, watch)
+                })
             });
             read::fill("out", out, &found.map_err(as_in_c)?.into())
         })
@@ -185,7 +195,9 @@ pub unsafe extern "C" fn vg_align_box(
             let options = read::required("options", options)?;
             let heading = options.heading()?;
             let found = in_context(options.context, |shop| {
-                shop.threads.run(|| align::to_box(&views, &sparse, size, heading))
+                watched(shop, "align", options.progress(), |watch| {
+                    align::to_box_watched(&views, &sparse, size, heading, watch)
+                })
             });
             read::fill("out", out, &found.map_err(as_in_c)?.into())
         })
@@ -266,7 +278,9 @@ pub unsafe extern "C" fn vg_align_folder(
             let options = read::optional("options", options)?;
             let heading = options.heading()?;
             let found = in_context(options.context, |shop| {
-                shop.threads.run(|| align::folder_to_scan(path, scan, heading))
+                watched(shop, "align", options.progress(), |watch| {
+                    align::folder_to_scan_watched(path, scan, heading, watch)
+                })
             });
             let (_, found) = found.map_err(|e| read::renamed(as_in_c(e), &[("scan", "scan_path")]))?;
             read::fill("out", out, &found.into())
@@ -275,6 +289,11 @@ pub unsafe extern "C" fn vg_align_folder(
 }
 
 impl vg_align_options {
+    /// Whom to tell how far the call is.
+    fn progress(&self) -> Told {
+        Told { callback: self.progress, user: self.progress_user }
+    }
+
     fn heading(&self) -> Result<Heading> {
         const HEADINGS: [(i32, &str, Heading); 3] = [
             (vg_heading::Auto as i32, "auto", Heading::Auto),

@@ -8,9 +8,11 @@ use super::image::extent;
 use super::read::{self, Versioned};
 use super::render::{Target, device, vg_alpha, vg_image_target, vg_render_options};
 use super::status::{vg_error, vg_status};
+use super::watched::watched;
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
-use crate::render::{Background, Gradients, PictureGradient, Rendered};
+use crate::progress::Watch;
+use crate::render::{Background, Differentiable, Gradients, PictureGradient, Rendered};
 use std::ffi::c_void;
 
 /// Called once on the calling thread when the picture is in `target`; fills the planes that the `vg_image_gradient`
@@ -157,7 +159,8 @@ pub unsafe extern "C" fn vg_gradients_init(gradients: *mut vg_gradients, size: u
 ///
 /// - gaussians: not NULL. Any number of threads may use them at a time.
 /// - camera: not NULL.
-/// - options: those of the picture; NULL for the default values. With a transparent background and a gradient of
+/// - options: those of the picture; NULL for the default values. With a target `progress` is not called; `loss` can end
+///   the call. With a transparent background and a gradient of
 ///   colour, `alpha` must be `VG_ALPHA_PREMULTIPLIED`.
 /// - target: NULL, or receives the picture; `gradient->loss` needs one. The memory it points to is written on success,
 ///   and before `loss` is called.
@@ -207,12 +210,17 @@ pub unsafe extern "C" fn vg_render_backward(
                 planes.copy(&mut of_picture)?;
             }
             in_context(options.context, |shop| {
-                let renderer = device.as_deref().unwrap_or(&shop.renderer);
                 let Some(target) = target else {
-                    let back = || renderer.backward(gaussians, &camera, &settings, &of_picture);
-                    out.write(&shop.threads.run(back)?);
+                    let back = |watch: &Watch| match &device {
+                        Some(device) => device.backward(gaussians, &camera, &settings, &of_picture),
+                        None => {
+                            shop.renderer.watched(watch).backward(gaussians, &camera, &settings, &of_picture)
+                        }
+                    };
+                    out.write(&watched(shop, "render", options.progress(), back)?);
                     return Ok(());
                 };
+                let renderer = device.as_deref().unwrap_or(&shop.renderer);
                 shop.pictures.lend(|picture| {
                     let mut gradients = Gradients::default();
                     let lent = Lent(&target, &planes);

@@ -2,6 +2,7 @@
 
 use super::read;
 use crate::error::{Error, Result};
+use crate::metrics::COLORS;
 use crate::scene::{DepthMap, Mask, PixelFormat, RgbImage};
 use std::ffi::c_void;
 
@@ -157,9 +158,10 @@ pub(super) unsafe fn on_white(argument: &str, image: &vg_image) -> Result<Vec<[f
             // Read bytewise: rows need not be aligned to floats.
             for (u, p) in bytes[v * stride..][..4 * CHANNEL * width].as_chunks::<16>().0.iter().enumerate() {
                 let p: [f32; 4] = bytemuck::pod_read_unaligned(p);
-                if !p.iter().all(|c| c.is_finite()) {
+                if !p.iter().all(|c| COLORS.contains(c)) {
                     let at = format!("{argument}, column {u}, row {v}");
-                    return Err(Error::argument(at, format!("{p:?}"), "finite"));
+                    let allowed = "0 to 1, and at most 1 beyond; divide the picture by its range first";
+                    return Err(Error::argument(at, format!("{p:?}"), allowed));
                 }
                 let [r, g, b, alpha] = p;
                 pixels.push(over([r, g, b], alpha.clamp(0.0, 1.0)));

@@ -5,13 +5,16 @@ use super::gaussians::{self, vg_gaussians};
 use super::guard::guarded;
 use super::image::{self, vg_image};
 use super::model::{self, vg_model};
+use super::options::vg_progress_fn;
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
 use super::view::{self, vg_view};
+use super::watched::{Told, watched};
 use crate::error::{Error, Result};
 use crate::metrics::{self, F_SCORE_M, Lpips, SurfaceErrors, SurfaceOptions, ViewErrors};
 use crate::render::{RenderOptions, Renderer};
 use crate::scene::cloud::MAX_CLOUD_POINTS;
+use std::ffi::c_void;
 
 /// Settings of `vg_metrics_pictures`, `vg_metrics_view` and `vg_metrics_surface`.
 #[repr(C)]
@@ -28,6 +31,10 @@ pub struct vg_metrics_options {
     pub f_score_m: f64,
     /// Reserved: 0.
     pub flags: u64,
+    /// Called in the course of `vg_metrics_view` and `vg_metrics_surface`, see `vg_progress_fn`. NULL: none.
+    pub progress: vg_progress_fn,
+    /// Handed to `progress`.
+    pub progress_user: *mut c_void,
 }
 
 unsafe impl Versioned for vg_metrics_options {
@@ -41,6 +48,8 @@ unsafe impl Versioned for vg_metrics_options {
             lpips: std::ptr::null(),
             f_score_m: F_SCORE_M,
             flags: 0,
+            progress: None,
+            progress_user: std::ptr::null_mut(),
         }
     }
 }
@@ -186,7 +195,8 @@ pub unsafe extern "C" fn vg_surface_errors_init(errors: *mut vg_surface_errors, 
 
 /// Compares two pictures.
 ///
-/// - a, b: RGB8, BGR8, RGBA8, BGRA8, GRAY8 or RGBA32F, of one size; what their alpha leaves open is white. Not NULL.
+/// - a, b: RGB8, BGR8, RGBA8, BGRA8, GRAY8 or RGBA32F, of one size; what their alpha leaves open is white. Floats are
+///   0 to 1, and what is more than 1 beyond is an error. Not NULL.
 /// - options: NULL for the default values.
 /// - out: a struct that `vg_picture_errors_init` was called for; unchanged on failure.
 /// - out_error: NULL, or receives the error.
@@ -256,8 +266,9 @@ pub unsafe extern "C" fn vg_metrics_view(
             let options = read::optional("options", options)?;
             let (lpips, _) = options.read()?;
             let errors = in_context(options.context, |shop: &Workshop| {
-                shop.threads.run(|| {
-                    let drawn = shop.renderer.render(gaussians, &view.camera, &RenderOptions::default())?;
+                watched(shop, "measure", options.progress(), |watch| {
+                    let renderer = shop.renderer.watched(watch);
+                    let drawn = renderer.render(gaussians, &view.camera, &RenderOptions::default())?;
                     let errors = ViewErrors::of(&drawn, &view);
                     let lpips = lpips.map_or(Ok(None), |lpips| lpips.of(&drawn, &view))?;
                     Ok(vg_view_errors {
@@ -308,7 +319,9 @@ pub unsafe extern "C" fn vg_metrics_surface(
             let (_, how) = options.read()?;
             let (points, _) = numbers.as_chunks::<3>();
             let errors = in_context(options.context, |shop| {
-                shop.threads.run(|| SurfaceErrors::with(gaussians, points, &how))
+                watched(shop, "measure", options.progress(), |watch| {
+                    SurfaceErrors::watched(gaussians, points, &how, watch)
+                })
             })
             .map_err(|e| read::renamed(e, &[("scan", "points")]))?;
             read::fill(
@@ -332,6 +345,11 @@ pub unsafe extern "C" fn vg_metrics_surface(
 }
 
 impl vg_metrics_options {
+    /// Whom to tell how far the call is.
+    fn progress(&self) -> Told {
+        Told { callback: self.progress, user: self.progress_user }
+    }
+
     /// The network, and how surfaces are compared.
     unsafe fn read(&self) -> Result<(Option<Lpips>, SurfaceOptions)> {
         read::zero("options.flags", self.flags == 0)?;

@@ -41,6 +41,8 @@ mod select;
 
 mod placed;
 
+mod watched;
+
 mod reconstruct;
 
 mod refine;

@@ -8,20 +8,19 @@ use super::render::{backend, vg_backend};
 use super::status::{c_string, one_line, vg_status};
 use crate::error::{Error, Result};
 use crate::pipeline::{Calibrate, Keep, Options, PriorChoice};
-use crate::progress::Progress;
 use crate::refine::{Amount, RefineOptions};
 use crate::relight::Relight;
 use crate::scene::cloud::MAX_CLOUD_POINTS;
 use crate::scene::{Cloud, Place};
 use crate::symmetry::SymmetryMode;
 use std::ffi::{CString, c_char, c_void};
-use std::ops::ControlFlow;
 
 /// Where metric depth comes from.
 #[repr(i32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum vg_prior {
-    /// `VG_PRIOR_GIVEN` if every used view has depth, else `VG_PRIOR_SHAPE`.
+    /// `VG_PRIOR_GIVEN` if every used view has depth, else `VG_PRIOR_SHAPE`. Where some views have depth, it counts as
+    /// measured points, to which the shape bends, and `log` is told.
     Auto = 0,
     /// The depth in the views.
     Given = 1,
@@ -95,9 +94,11 @@ pub enum vg_log_level {
     Debug = 3,
 }
 
-/// Called on the calling thread at every stage boundary and inside long stages: the stage's name, how much of it is
-/// done, 0 to 1, and the caller's pointer. Returns 0 to go on; anything else ends the call with
-/// `VG_STATUS_CANCELLED`. May call the library; may not throw or jump out.
+/// Called on the calling thread: the stage's name, how much of it is done, 0 to 1, and the caller's pointer. Returns 0
+/// to go on; anything else ends the call with `VG_STATUS_CANCELLED`. May call the library; may not throw or jump out.
+///
+/// A reconstruction calls it at every stage boundary, inside long stages, and at the end. Calls of one stage call it at
+/// the start, about every 50 ms, and with 1 at the end; they stop within some tenths of a second.
 pub type vg_progress_fn =
     Option<unsafe extern "C" fn(stage: *const c_char, fraction: f64, user: *mut c_void) -> i32>;
 
@@ -191,6 +192,9 @@ pub struct vg_options {
     pub has_vehicle_place: i32,
     /// Must be 0.
     pub vehicle_flags: u32,
+    /// NULL, or where the part of the whole call that is done is written before each call of `progress`: 0 to 1, in
+    /// expected time; it never falls, and is 1 in the last call.
+    pub progress_overall: *mut f64,
 }
 
 unsafe impl Versioned for vg_options {
@@ -232,6 +236,7 @@ unsafe impl Versioned for vg_options {
             vehicle_yaw: 0.0,
             has_vehicle_place: 0,
             vehicle_flags: 0,
+            progress_overall: std::ptr::null_mut(),
         }
     }
 }
@@ -343,20 +348,6 @@ fn keep(bits: u32) -> Result<Keep> {
         floaters: has(vg_keep::Floaters),
         sh_bands: has(vg_keep::ShBands),
     })
-}
-
-/// Tells the caller's callback, where there is one, how far a call is.
-pub(super) unsafe fn tell(
-    callback: vg_progress_fn,
-    user: *mut c_void,
-    progress: Progress,
-) -> ControlFlow<()> {
-    let Some(callback) = callback else { return ControlFlow::Continue(()) };
-    let stage = c_string(progress.stage.to_owned());
-    match unsafe { callback(stage.as_ptr(), progress.fraction, user) } {
-        0 => ControlFlow::Continue(()),
-        _ => ControlFlow::Break(()),
-    }
 }
 
 /// The caller's log, or nobody.

@@ -3,13 +3,15 @@
 use super::context::{Workshop, in_context};
 use super::gaussians::{self, vg_gaussians};
 use super::guard::{clear, guarded};
-use super::options::{Log, tell, vg_log_level, vg_options};
+use super::options::{Log, vg_log_level, vg_options};
 use super::read;
 use super::report::{ReportObject, vg_report};
 use super::status::{vg_error, vg_status};
 use super::view::{self, vg_view};
+use super::watched::Told;
 use crate::error::Result;
 use crate::pipeline::{self, Reconstruction, Report};
+use crate::progress::Progress;
 use crate::scene::Scene;
 
 /// Makes a complete vehicle of photographs of one side.
@@ -57,7 +59,13 @@ unsafe fn run(
     settings: &pipeline::Options,
     options: &vg_options,
 ) -> Result<Reconstruction> {
-    let mut progress = |at| unsafe { tell(options.progress, options.progress_user, at) };
+    let told = Told { callback: options.progress, user: options.progress_user };
+    let mut progress = |at: Progress| {
+        if !options.progress_overall.is_null() {
+            unsafe { options.progress_overall.write_unaligned(at.overall) };
+        }
+        unsafe { told.tell(at) }
+    };
     let mut made = pipeline::reconstruct_on(&shop.threads, scene, settings, &mut progress)?;
     made.report.settings.threads = shop.threads.count();
     unsafe { log(Log { callback: options.log, user: options.log_user }, &made.report) };
@@ -66,8 +74,9 @@ unsafe fn run(
 
 unsafe fn log(log: Log, report: &Report) {
     unsafe {
-        for warning in report.warnings() {
-            log.line(vg_log_level::Warning, || warning);
+        let of_network = report.network.iter().flat_map(|network| &network.warnings);
+        for warning in report.warnings.iter().chain(of_network) {
+            log.line(vg_log_level::Warning, || warning.clone());
         }
         for left in &report.left_out {
             log.line(vg_log_level::Info, || format!("left out {} {}: {}", left.count, left.what, left.why));

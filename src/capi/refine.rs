@@ -3,11 +3,12 @@
 use super::context::{in_context, vg_context};
 use super::gaussians::{self, vg_gaussians};
 use super::guard::{clear, guarded};
-use super::options::{tell, vg_progress_fn};
+use super::options::vg_progress_fn;
 use super::read::{self, Versioned};
 use super::render::{backend, vg_backend};
 use super::status::{vg_error, vg_status};
 use super::view::{self, vg_view};
+use super::watched::Told;
 use crate::error::Result;
 use crate::refine::{self, Amount, Densify, RefineOptions, Refinement, Stop};
 use std::ffi::c_void;
@@ -206,7 +207,8 @@ pub unsafe extern "C" fn vg_refine(
             if !out_refinement.is_null() {
                 read::fillable("out_refinement", out_refinement)?;
             }
-            let mut progress = |at| tell(options.progress, options.progress_user, at);
+            let told = Told { callback: options.progress, user: options.progress_user };
+            let mut progress = |at| told.tell(at);
             let (refined, done) = in_context(options.context, |shop| {
                 refine::model_on(&shop.threads, gaussians, &scene, &settings, &mut progress)
             })?;

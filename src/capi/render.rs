@@ -5,9 +5,10 @@ use super::context::{in_context, vg_context};
 use super::gaussians::{self, vg_gaussians};
 use super::guard::guarded;
 use super::image::{extent, vg_format};
-use super::options::sh_degree;
+use super::options::{sh_degree, vg_progress_fn};
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
+use super::watched::{Told, watched};
 use crate::error::{Error, Result};
 use crate::render::backend::{Trainer, is_built, not_built, trainer};
 use crate::render::{Backend, Background, DepthMode, RenderOptions, Rendered};
@@ -91,6 +92,10 @@ pub struct vg_render_options {
     pub max_alpha: f32,
     /// Reserved: 0.
     pub flags: u32,
+    /// Called in the course of the call, see `vg_progress_fn`. NULL: none.
+    pub progress: vg_progress_fn,
+    /// Handed to `progress`.
+    pub progress_user: *mut c_void,
 }
 
 unsafe impl Versioned for vg_render_options {
@@ -114,6 +119,8 @@ unsafe impl Versioned for vg_render_options {
             far_plane: rust.far,
             max_alpha: rust.max_alpha,
             flags: 0,
+            progress: None,
+            progress_user: std::ptr::null_mut(),
         }
     }
 }
@@ -210,8 +217,9 @@ pub unsafe extern "C" fn vg_render(
                 shop.pictures.lend(|picture| {
                     match device(&options)? {
                         Some(device) => *picture = device.render(gaussians, &camera, &settings)?,
-                        None => shop.threads.run(|| {
-                            shop.renderer.render_into(gaussians, &camera, &settings, picture).map(drop)
+                        None => watched(shop, "render", options.progress(), |watch| {
+                            let renderer = shop.renderer.watched(watch);
+                            renderer.render_into(gaussians, &camera, &settings, picture).map(drop)
                         })?,
                     }
                     target.write(picture);
@@ -244,6 +252,11 @@ pub(super) fn backend(argument: &str, number: i32) -> Result<Backend> {
 }
 
 impl vg_render_options {
+    /// Whom to tell how far the call is.
+    pub(super) fn progress(&self) -> Told {
+        Told { callback: self.progress, user: self.progress_user }
+    }
+
     pub(super) fn read(&self) -> Result<(RenderOptions, vg_alpha)> {
         backend("options.backend", self.backend)?;
         let backgrounds = [

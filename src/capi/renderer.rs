@@ -7,6 +7,7 @@ use super::guard::{clear, free, guarded, guarded_value};
 use super::read::{self, Versioned};
 use super::render::{Target, backend, vg_backend, vg_image_target, vg_render_options};
 use super::status::{c_string, vg_error, vg_status};
+use super::watched::watched;
 use crate::error::Error;
 use crate::render::{AssetRenderer, Backend, Rgba8};
 use std::ffi::{CString, c_char};
@@ -145,15 +146,15 @@ pub unsafe extern "C" fn vg_renderer_render(
             // Of the CPU's planes the bytes are made on the way to the target.
             let as_bytes = ready.choice().backend == Backend::Gpu && places.iter().all(Target::takes_bytes);
             in_context(options.context, |shop| {
-                shop.threads.run(|| match as_bytes {
+                watched(shop, "render", options.progress(), |watch| match as_bytes {
                     true => shop.bytes.lend(|bytes| {
-                        ready.render_each(&seen, &settings, bytes, |i, rgba: &Rgba8| {
+                        ready.render_each_watched(&seen, &settings, bytes, watch, |i, rgba: &Rgba8| {
                             places[i].write_bytes(&rgba.pixels, seen[i].width);
                             Ok(())
                         })
                     }),
                     false => shop.pictures.lend(|picture| {
-                        ready.render_each(&seen, &settings, picture, |i, planes| {
+                        ready.render_each_watched(&seen, &settings, picture, watch, |i, planes| {
                             places[i].write(planes);
                             Ok(())
                         })

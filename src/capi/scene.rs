@@ -4,10 +4,11 @@ use super::camera::vg_camera;
 use super::context::{Workshop, in_context, vg_context};
 use super::guard::{clear, free, guarded, guarded_value};
 use super::image::{vg_format, vg_image};
-use super::options::{Log, vg_log_fn, vg_log_level};
+use super::options::{Log, vg_log_fn, vg_log_level, vg_progress_fn};
 use super::read::{self, Versioned};
 use super::status::{c_string, vg_error, vg_status};
 use super::view::vg_view;
+use super::watched::{Told, watched};
 use crate::error::{Error, Result};
 use crate::geometry::Similarity;
 use crate::io::{self, SceneFormat, SceneOptions};
@@ -54,6 +55,10 @@ pub struct vg_scene_options {
     pub log: vg_log_fn,
     /// Handed to `log`.
     pub log_user: *mut c_void,
+    /// Called in the course of the call, see `vg_progress_fn`. NULL: none.
+    pub progress: vg_progress_fn,
+    /// Handed to `progress`.
+    pub progress_user: *mut c_void,
 }
 
 unsafe impl Versioned for vg_scene_options {
@@ -72,6 +77,8 @@ unsafe impl Versioned for vg_scene_options {
             flags: 0,
             log: None,
             log_user: std::ptr::null_mut(),
+            progress: None,
+            progress_user: std::ptr::null_mut(),
         }
     }
 }
@@ -132,7 +139,10 @@ unsafe fn open(
                 SceneFormat::Transforms => read::optional("options", options)?,
             };
             let wanted = SceneOptions { format: Some(format), ..options.read()? };
-            let open = |shop: &Workshop| shop.threads.run(|| io::open_scene(path, &wanted));
+            let told = Told { callback: options.progress, user: options.progress_user };
+            let open = |shop: &Workshop| {
+                watched(shop, "read", told, |watch| io::open_scene_watched(path, &wanted, watch))
+            };
             let files = in_context(options.context, open)
                 .map_err(|e| read::renamed(e, &[("depth_scale", "options.depth_scale")]))?;
             let log = Log { callback: options.log, user: options.log_user };

@@ -3,19 +3,28 @@
 use super::scene::SceneView;
 use super::{depth, image};
 use crate::error::{Error, Result};
+use crate::progress::Watch;
 use crate::scene::mask::VEHICLE_THRESHOLD;
 use crate::scene::view::MAX_VIEWS;
 use crate::scene::{Scene, View};
 use rayon::prelude::*;
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The scene of these views, and notes on what is legal but looks like a mistake.
-pub(super) fn load(views: &[SceneView]) -> Result<(Scene, Vec<String>)> {
+pub(super) fn load(views: &[SceneView], watch: &Watch) -> Result<(Scene, Vec<String>)> {
     // Before a picture is decoded, not after all are.
     if views.is_empty() || views.len() > MAX_VIEWS {
         return Err(Error::argument("views", views.len().to_string(), format!("1 to {MAX_VIEWS}")));
     }
-    let loaded: Vec<(View, Vec<String>)> = views.par_iter().map(load_view).collect::<Result<_>>()?;
+    let read = AtomicUsize::new(0);
+    let one = |view: &SceneView| {
+        watch.check()?;
+        let loaded = load_view(view)?;
+        watch.report((read.fetch_add(1, Ordering::Relaxed) + 1) as f64 / views.len() as f64)?;
+        Ok(loaded)
+    };
+    let loaded: Vec<(View, Vec<String>)> = views.par_iter().map(one).collect::<Result<_>>()?;
     let (views, notes): (Vec<View>, Vec<Vec<String>>) = loaded.into_iter().unzip();
     let mut notes: Vec<String> = notes.into_iter().flatten().collect();
     if views.iter().any(|v| v.mask.is_some()) {

@@ -27,6 +27,7 @@ pub use masked::{MaskedViews, colmap_format, read_masked};
 pub use realcar::find_scan;
 pub use scene::{
     NamedCamera, SceneFiles, SceneFormat, SceneIndex, SceneOptions, SceneView, list_scene, open_scene,
+    open_scene_watched,
 };
 pub use vehicle_frame::{
     FitQuality, read_known_centers, read_matrix, read_vehicle_from_world, vehicle_from_known_centers,

@@ -6,6 +6,7 @@ use super::{colmap, load, select};
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, Similarity};
 use crate::io::ply::ColoredPoints;
+use crate::progress::{UNWATCHED, Watch};
 use crate::scene::{Scene, VehicleBox};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
@@ -133,6 +134,11 @@ pub fn open_scene(path: &Path, options: &SceneOptions) -> Result<SceneFiles> {
     list_scene(path, options)?.load()
 }
 
+/// As [`open_scene`], under `watch`, which is told of every view and looked at before the next.
+pub fn open_scene_watched(path: &Path, options: &SceneOptions, watch: &Watch) -> Result<SceneFiles> {
+    list_scene(path, options)?.load_watched(watch)
+}
+
 impl SceneIndex {
     /// The cameras alone.
     pub fn cameras(&self) -> Vec<NamedCamera> {
@@ -153,7 +159,11 @@ impl SceneIndex {
 
     /// Reads the pixels of all views listed.
     pub fn load(self) -> Result<SceneFiles> {
-        let (mut scene, notes) = load::load(&self.views)?;
+        self.load_watched(&UNWATCHED)
+    }
+
+    fn load_watched(self, watch: &Watch) -> Result<SceneFiles> {
+        let (mut scene, notes) = load::load(&self.views, watch)?;
         scene.vehicle_box = self.vehicle_box;
         Ok(SceneFiles { index: self, scene, notes })
     }

@@ -14,6 +14,7 @@ pub(crate) use ssim::{Reference, WINDOW};
 pub use surface::{F_SCORE_M, SurfaceErrors, SurfaceOptions, visible_surface};
 pub use views::ViewErrors;
 
+use crate::error::{Error, Result};
 use crate::scene::View;
 use crate::scene::mask::Label;
 
@@ -24,6 +25,21 @@ pub fn on_white(view: &View) -> Vec<[f32; 3]> {
         if vehicle { rgb.map(|c| f32::from(c) / 255.0) } else { [1.0; 3] }
     };
     view.image.pixels().iter().enumerate().map(pixel).collect()
+}
+
+/// What pictures in [0, 1] may hold: spherical harmonics overshoot white by tenths. What lies farther out is not of this
+/// range (0 to 255, for one), and clamped it would be equal to anything as bright.
+pub const COLORS: std::ops::RangeInclusive<f32> = -1.0..=2.0;
+
+/// All finite and within [`COLORS`]; `argument` names the picture, whose rows have `width` pixels of `channels`.
+///
+/// # Errors
+/// [`Error::Argument`] that names the first number that is not.
+pub fn check_colors(argument: &str, values: &[f32], width: usize, channels: usize) -> Result<()> {
+    let Some(at) = values.iter().position(|v| !COLORS.contains(v)) else { return Ok(()) };
+    let (row, column) = (at / (width * channels), at / channels % width);
+    let allowed = "0 to 1, and at most 1 beyond; divide the picture by its range first";
+    Err(Error::argument(format!("{argument}[{row}, {column}]"), values[at].to_string(), allowed))
 }
 
 /// Peak signal-to-noise ratio of two pictures in [0, 1], dB; values outside are clamped first, as a display

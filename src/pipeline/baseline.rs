@@ -2,9 +2,9 @@
 
 use super::check::input_error;
 use super::options::Options;
-use super::plan;
 use super::report::{Clock, Report, peak_rss_bytes};
 use super::run::{Reconstruction, chosen_views, undistorted};
+use super::{budget, cost, plan};
 use crate::error::Result;
 use crate::prior::volume::KnownBox;
 use crate::progress::Context;
@@ -21,6 +21,7 @@ pub(super) fn reconstruct(
     context: &Context,
 ) -> Result<Reconstruction> {
     context.report("plan", 0.0)?;
+    context.follow(cost::course_of_baseline(&budget::load(scene), options, how, context.threads()));
     let mut left_out = Vec::new();
     let used = plan::views(scene, &options.keep, &mut left_out)?;
     let used = chosen_views(scene, used, options, &mut left_out);
@@ -72,11 +73,13 @@ pub(super) fn reconstruct(
         network: None,
         plan: None,
         left_out,
+        warnings: Vec::new(),
         symmetry: completion,
         relight: None,
         refinement: Some(refinement),
         input_error,
         settings: options.clone(),
     };
+    context.report_end()?;
     Ok(Reconstruction { gaussians, points: None, report })
 }

@@ -5,6 +5,7 @@ pub mod budget;
 mod check;
 mod cost;
 pub mod machine;
+mod measured;
 pub mod options;
 mod pixels;
 mod plan;

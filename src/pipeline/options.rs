@@ -13,7 +13,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PriorChoice {
-    /// `Given` if every used view has depth, else the best prior without: `Shape`.
+    /// `Given` if every used view has depth, else the best prior without: `Shape`. Where some views have depth, it counts
+    /// as measured points, to which the shape bends.
     #[default]
     Auto,
     /// The caller's metric depth.

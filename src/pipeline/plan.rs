@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::prior::volume::known_box::TELLING_M;
 use crate::prior::{BoxSource, Geometry, PointFit, WorkingBox};
-use crate::scene::{Cloud, Scene, View};
+use crate::scene::{Scene, View};
 use glam::DVec3;
 
 /// Cameras nearer to each other than this, looking the same way, show the same.
@@ -115,11 +115,11 @@ pub(super) fn note_size(left_out: &mut Vec<LeftOut>, is_known: bool, geometry: &
     note(left_out, "vehicle size", &why, usize::from(is_known));
 }
 
-/// Points of the cloud that moved no surface.
-pub(super) fn note_cloud(left_out: &mut Vec<LeftOut>, cloud: &Cloud, fit: Option<PointFit>) {
+/// Points of a cloud of `count` that moved no surface.
+pub(super) fn note_cloud(left_out: &mut Vec<LeftOut>, count: usize, fit: Option<PointFit>) {
     match fit {
         Some(fit) => note(left_out, "points", "outside the silhouettes: not the vehicle's", fit.outside),
-        None => note(left_out, "points", "the depth is given, not estimated", cloud.points().len()),
+        None => note(left_out, "points", "the depth is given, not estimated", count),
     }
 }
 

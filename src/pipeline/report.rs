@@ -106,6 +106,8 @@ pub struct Report {
     pub plan: Option<BudgetPlan>,
     /// Work this scene did not need.
     pub left_out: Vec<LeftOut>,
+    /// What is legal but looks like a mistake, or did not turn out as it was asked for, one sentence each.
+    pub warnings: Vec<String>,
     /// How the unseen side was completed.
     pub symmetry: Completion,
     /// The light of the unseen side, where it was estimated.
@@ -117,31 +119,6 @@ pub struct Report {
     /// The options of the call; where it had a budget, those that were chosen: with them and without a budget another
     /// call does the same.
     pub settings: Options,
-}
-
-/// A size that is contradicted by less is within what masks and poses are off by, metres.
-const CONTRADICTION_TOLD_M: f64 = 0.05;
-
-impl Report {
-    /// What a caller should know of a run that went well, one sentence each: it looks like a mistake in the input, or is
-    /// not what was asked for.
-    pub fn warnings(&self) -> Vec<String> {
-        let network = self.network.iter().flat_map(|network| network.warnings.iter().cloned());
-        let budget = self.plan.as_ref().and_then(BudgetPlan::warning);
-        let contradicted = self.working_box.filter(|b| b.contradicted_m > CONTRADICTION_TOLD_M);
-        let size = contradicted.map(|b| {
-            let use_made = match b.source {
-                BoxSource::Given => "it was used all the same",
-                BoxSource::Estimated => "it was not used",
-            };
-            format!(
-                "the vehicle's size that was given and the silhouettes contradict each other by {:.2} m: {use_made}; check the \
-                 size (length, width, height), the masks and the poses",
-                b.contradicted_m
-            )
-        });
-        network.chain(budget).chain(size).collect()
-    }
 }
 
 /// Times the stages.

@@ -1,12 +1,13 @@
 //! The run: plan -> undistort -> calibrate -> prior -> pixels -> head -> symmetry -> check.
 
+use super::budget::{self, BudgetPlan};
 use super::check::input_error;
 use super::options::{Calibrate, Options, PriorChoice};
 use super::pixels::{self, BETTER};
 use super::report::{Clock, LeftOut, Report, peak_rss_bytes};
 use super::size::VehicleSize;
 use super::spread::spread;
-use super::{baseline, budget, cost, plan};
+use super::{baseline, cost, measured, plan};
 use crate::calibrate::{self, Calibrated, Moved};
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
@@ -15,7 +16,7 @@ use crate::geometry::{Camera, Similarity};
 use crate::head::surfel::FOOTPRINT_SIGMA_PX;
 use crate::head::{GaussianHead, NetworkHead, SurfelHead};
 use crate::prior::volume::KnownBox;
-use crate::prior::{DepthPrior, Geometry, GivenDepth, HullPrior, NetworkPrior, ShapePrior};
+use crate::prior::{DepthPrior, Geometry, GivenDepth, HullPrior, NetworkPrior, ShapePrior, WorkingBox};
 use crate::progress::{Context, ProgressCallback, Threads};
 use crate::refine::{self, tie::Clone as Tied};
 use crate::relight::{Light, Relight, Relighting};
@@ -81,8 +82,11 @@ pub fn reconstruct_on<'a>(
 
     context.report("plan", 0.0)?;
     let mut left_out = Vec::new();
+    let mut warnings = Vec::new();
+    let asked = options.prior;
     let (options, budget) = budget::resolved(scene, options, &context, || clock.elapsed(), &mut left_out);
     let options = &options;
+    context.follow(cost::course(&budget::load(scene), options, context.threads()));
     let used = plan::views(scene, &options.keep, &mut left_out)?;
     let used = chosen_views(scene, used, options, &mut left_out);
     clock.lap("plan");
@@ -121,14 +125,30 @@ pub fn reconstruct_on<'a>(
         Some(moved) => cloud.in_frame(&moved.vehicle_from_corrected),
         None => cloud.clone(),
     });
-    let source = plan::prior(options.prior, views.iter().all(|v| v.depth.is_some()));
+    let with_depth = seen.iter().filter(|v| v.depth.is_some()).count();
+    let source = plan::prior(options.prior, with_depth == seen.len());
+    let cloud = match asked {
+        PriorChoice::Auto if (1..seen.len()).contains(&with_depth) => {
+            warnings.push(format!(
+                "depth: {} of {} views have none: the depth of the others counts as measured points, to which the \
+                 prior {} bends; prior given needs it for every view",
+                seen.len() - with_depth,
+                seen.len(),
+                source.name()
+            ));
+            measured::points(&seen, cloud)?
+        }
+        _ => cloud,
+    };
+    let points_given = cloud.as_ref().map(|cloud| cloud.points().len());
     let placed = known_box.map(|known| KnownBox::in_working_frame(&known, beside.is_some()));
     let prior = chosen_prior(source, cloud, placed, options)?;
     let mut geometry = prior.estimate(&views, &context)?;
     geometry.find_normals(&views, &context);
     plan::note_size(&mut left_out, known_box.is_some(), &geometry);
-    if let Some(cloud) = &scene.cloud {
-        plan::note_cloud(&mut left_out, cloud, geometry.points);
+    warnings.extend(geometry.working_box.as_ref().and_then(WorkingBox::warning));
+    if let Some(count) = points_given {
+        plan::note_cloud(&mut left_out, count, geometry.points);
     }
     clock.lap("prior");
 
@@ -179,8 +199,8 @@ pub fn reconstruct_on<'a>(
     clock.lap("check");
 
     let (stages, total_ms) = clock.finish();
-    let refine_ms: f64 = stages.iter().filter(|stage| stage.name == "refine").map(|stage| stage.ms).sum();
-    let budget = budget.map(|plan| plan.after(1e-3 * (total_ms - refine_ms)));
+    let budget = budget.map(|plan| plan.after(&stages));
+    warnings.extend(budget.as_ref().and_then(BudgetPlan::warning));
     let report = Report {
         version: env!("CARGO_PKG_VERSION"),
         prior: prior.name(),
@@ -202,12 +222,14 @@ pub fn reconstruct_on<'a>(
         network: geometry.network,
         plan: budget,
         left_out,
+        warnings,
         symmetry: completion,
         relight,
         refinement,
         input_error,
         settings: options.clone(),
     };
+    context.report_end()?;
     Ok(Reconstruction { gaussians, points, report })
 }
 

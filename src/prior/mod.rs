@@ -145,7 +145,25 @@ pub enum BoxSource {
     Estimated,
 }
 
+/// A size that is contradicted by less is within what masks and poses are off by, metres.
+const CONTRADICTION_TOLD_M: f64 = 0.05;
+
 impl WorkingBox {
+    /// What a caller should know whose size the silhouettes contradict.
+    pub fn warning(&self) -> Option<String> {
+        let use_made = match self.source {
+            BoxSource::Given => "it was used all the same",
+            BoxSource::Estimated => "it was not used",
+        };
+        (self.contradicted_m > CONTRADICTION_TOLD_M).then(|| {
+            format!(
+                "the vehicle's size that was given and the silhouettes contradict each other by {:.2} m: {use_made}; check the \
+                 size (length, width, height), the masks and the poses",
+                self.contradicted_m
+            )
+        })
+    }
+
     /// Length, width, height in metres.
     pub fn size(&self) -> [f64; 3] {
         std::array::from_fn(|k| self.high[k] - self.low[k])

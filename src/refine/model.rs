@@ -3,7 +3,7 @@
 use super::{RefineOptions, Refinement, refine};
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
-use crate::progress::{Context, ProgressCallback, Threads};
+use crate::progress::{Context, Course, ProgressCallback, Threads};
 use crate::scene::{Scene, View, undistort};
 use rayon::prelude::*;
 
@@ -42,7 +42,10 @@ pub fn model_on<'a>(
     // Shorter-lived than the callback it borrows.
     let mut progress = |at| progress(at);
     let context = Context::new(threads, &mut progress);
+    context.follow(Course::new(vec![("refine", 1.0)]));
     let straight = || scene.views.par_iter().map(undistort::undistorted).collect::<Result<Vec<View>>>();
     let views = context.parallel(straight)?;
-    refine(gaussians.clone(), &[], &views, options, &context)
+    let refined = refine(gaussians.clone(), &[], &views, options, &context)?;
+    context.report_end()?;
+    Ok(refined)
 }

@@ -9,6 +9,7 @@ use crate::error::Error;
 use crate::error::Result;
 use crate::gaussians::Gaussians;
 use crate::geometry::Camera;
+use crate::progress::{UNWATCHED, Watch};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Below this many Gaussians [`Backend::Auto`] leaves the graphics processor alone: the CPU draws 20,000 in the few
@@ -107,6 +108,18 @@ impl AssetRenderer {
         options: &RenderOptions,
         target: &mut P,
     ) -> Result<()> {
+        self.render_into_watched(camera, options, target, &UNWATCHED)
+    }
+
+    /// As [`AssetRenderer::render_into`], under `watch`. A device is not stopped in the middle of a picture.
+    pub fn render_into_watched<P: Picture>(
+        &self,
+        camera: &Camera,
+        options: &RenderOptions,
+        target: &mut P,
+        watch: &Watch,
+    ) -> Result<()> {
+        watch.check()?;
         #[cfg(feature = "gpu")]
         if let Some(device) = self.device() {
             match target.draw_on(&device.renderer, &device.asset, camera, options) {
@@ -114,7 +127,7 @@ impl AssetRenderer {
                 done => return done,
             }
         }
-        target.draw(&self.cpu, &self.gaussians, camera, options)
+        target.draw(self.cpu.watched(watch), &self.gaussians, camera, options)
     }
 
     /// A picture for each camera, made in the memory of `picture` and handed to `take` in their order with the camera's
@@ -126,8 +139,24 @@ impl AssetRenderer {
         cameras: &[Camera],
         options: &RenderOptions,
         picture: &mut P,
+        take: impl FnMut(usize, &P) -> Result<()>,
+    ) -> Result<()> {
+        self.render_each_watched(cameras, options, picture, &UNWATCHED, take)
+    }
+
+    /// As [`AssetRenderer::render_each`], under `watch`, which is told of every picture.
+    pub fn render_each_watched<P: Picture>(
+        &self,
+        cameras: &[Camera],
+        options: &RenderOptions,
+        picture: &mut P,
+        watch: &Watch,
         mut take: impl FnMut(usize, &P) -> Result<()>,
     ) -> Result<()> {
+        let mut take = |i: usize, picture: &P| {
+            take(i, picture)?;
+            watch.report((i + 1) as f64 / cameras.len() as f64)
+        };
         #[cfg_attr(not(feature = "gpu"), expect(unused_mut))]
         let mut done = 0;
         #[cfg(feature = "gpu")]
@@ -144,7 +173,7 @@ impl AssetRenderer {
             }
         }
         for (i, camera) in cameras.iter().enumerate().skip(done) {
-            picture.draw(&self.cpu, &self.gaussians, camera, options)?;
+            picture.draw(self.cpu.watched(watch), &self.gaussians, camera, options)?;
             take(i, picture)?;
         }
         Ok(())

@@ -1,8 +1,9 @@
 //! What a picture may be wanted as: planes or bytes.
 
-use super::{CpuRenderer, RenderOptions, Rendered, Rgba8};
+use super::cpu::Watched;
 #[cfg(feature = "gpu")]
 use super::{GpuAsset, GpuRenderer, gpu::Target};
+use super::{RenderOptions, Rendered, Rgba8};
 use crate::error::Result;
 use crate::gaussians::Gaussians;
 use crate::geometry::Camera;
@@ -20,7 +21,7 @@ pub(crate) mod inside {
     pub trait Drawn {
         fn draw(
             &mut self,
-            cpu: &CpuRenderer,
+            cpu: Watched<'_>,
             gaussians: &Gaussians,
             camera: &Camera,
             options: &RenderOptions,
@@ -44,7 +45,7 @@ pub(crate) mod inside {
 impl inside::Drawn for Rendered {
     fn draw(
         &mut self,
-        cpu: &CpuRenderer,
+        cpu: Watched<'_>,
         gaussians: &Gaussians,
         camera: &Camera,
         options: &RenderOptions,
@@ -72,7 +73,7 @@ impl inside::Drawn for Rendered {
 impl inside::Drawn for Rgba8 {
     fn draw(
         &mut self,
-        cpu: &CpuRenderer,
+        cpu: Watched<'_>,
         gaussians: &Gaussians,
         camera: &Camera,
         options: &RenderOptions,

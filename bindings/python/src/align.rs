@@ -1,15 +1,17 @@
 //! From the world of a structure-from-motion model to the vehicle's frame; `vehicle_gaussians._align` names the numbers.
 
-use crate::arrays::{floats, matrix4, numbers, owned, shape_text, values, vector};
+use crate::arrays::{floats, matrix4, owned, rows, shape_text, values, vector};
 use crate::camera::Camera;
-use crate::errors::{bad_value, from_library, pooled, renamed};
+use crate::errors::{bad_value, from_library, renamed};
 use crate::reconstruct::mask;
+use crate::watched::watched;
 use crate::whole;
 use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use vg::View;
-use vg::align::{BoxAlignment, Heading, ScanAlignment, folder_to_scan, to_box, to_scan};
+use vg::align::{BoxAlignment, Heading, ScanAlignment};
+use vg::align::{folder_to_scan_watched, to_box_watched, to_scan_watched};
 use vg::geometry::Similarity;
 use vg::scene::Cloud;
 
@@ -21,7 +23,7 @@ type Matrix<'py> = Bound<'py, PyArray2<f64>>;
 type Found<'py> = (Matrix<'py>, f64, f64, f64, Option<f64>, Option<f64>, usize);
 
 #[pyfunction]
-#[pyo3(signature = (masks, cameras, scan, sparse, heading, names, threads))]
+#[pyo3(signature = (masks, cameras, scan, sparse, heading, names, threads, progress))]
 pub(crate) fn align_scan<'py>(
     py: Python<'py>,
     masks: Vec<Option<Bound<'py, PyAny>>>,
@@ -31,6 +33,7 @@ pub(crate) fn align_scan<'py>(
     heading: &str,
     names: Option<Vec<String>>,
     #[pyo3(from_py_with = whole::threads)] threads: usize,
+    progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Found<'py>> {
     let scan = floats(scan, "scan", "an array of floats, metres, (n, 3)")?;
     if !matches!(scan.shape(), [_, 3]) {
@@ -39,17 +42,17 @@ pub(crate) fn align_scan<'py>(
     // A copy: others may write to the array while the library works.
     let points = values(&scan)?.as_chunks::<3>().0.to_vec();
     let views = views_of(py, &masks, &cameras, names)?;
-    let sparse = sparse.map_or_else(|| Ok(Vec::new()), |object| rows(object, "sparse"))?;
+    let sparse = sparse.map_or_else(|| Ok(Vec::new()), |object| rows::<3>(object, "sparse"))?;
     let heading = heading_of(py, heading)?;
-    let found = pooled(py, threads, || {
+    let found = watched(py, threads, "align", progress, |watch| {
         let scan = Cloud::new(points).map_err(|e| renamed(e, "cloud", "scan"))?;
-        to_scan(&views, &sparse.iter().map(|&p| p.into()).collect::<Vec<_>>(), &scan, heading)
+        to_scan_watched(&views, &sparse.iter().map(|&p| p.into()).collect::<Vec<_>>(), &scan, heading, watch)
     })?;
     Ok(by_scan(py, &found))
 }
 
 #[pyfunction]
-#[pyo3(signature = (masks, cameras, sparse, size, heading, names, threads))]
+#[pyo3(signature = (masks, cameras, sparse, size, heading, names, threads, progress))]
 pub(crate) fn align_box<'py>(
     py: Python<'py>,
     masks: Vec<Option<Bound<'py, PyAny>>>,
@@ -59,13 +62,21 @@ pub(crate) fn align_box<'py>(
     heading: &str,
     names: Option<Vec<String>>,
     #[pyo3(from_py_with = whole::threads)] threads: usize,
+    progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Found<'py>> {
     let views = views_of(py, &masks, &cameras, names)?;
-    let (sparse, size) = (rows(sparse, "sparse")?, vector::<3>(size, "size")?);
+    let (sparse, size) = (rows::<3>(sparse, "sparse")?, vector::<3>(size, "size")?);
     let heading = heading_of(py, heading)?;
-    let BoxAlignment { vehicle_from_world, residual_m, confidence, views, .. } = pooled(py, threads, || {
-        to_box(&views, &sparse.iter().map(|&p| p.into()).collect::<Vec<_>>(), size, heading)
-    })?;
+    let BoxAlignment { vehicle_from_world, residual_m, confidence, views, .. } =
+        watched(py, threads, "align", progress, |watch| {
+            to_box_watched(
+                &views,
+                &sparse.iter().map(|&p| p.into()).collect::<Vec<_>>(),
+                size,
+                heading,
+                watch,
+            )
+        })?;
     Ok(found(py, &vehicle_from_world, residual_m, confidence, None, views))
 }
 
@@ -89,7 +100,7 @@ pub(crate) fn align_points<'py>(
     vehicle: &Bound<'py, PyAny>,
 ) -> PyResult<Fitted<'py>> {
     let py = world.py();
-    let (from, to) = (rows(world, "world")?, rows(vehicle, "vehicle")?);
+    let (from, to) = (rows::<3>(world, "world")?, rows::<3>(vehicle, "vehicle")?);
     if from.len() != to.len() {
         let allowed = format!("as many as world, {}", from.len());
         return Err(bad_value(py, "vehicle", &to.len().to_string(), &allowed));
@@ -106,16 +117,19 @@ pub(crate) fn align_points<'py>(
 }
 
 #[pyfunction]
-#[pyo3(signature = (path, scan, heading, threads))]
+#[pyo3(signature = (path, scan, heading, threads, progress))]
 pub(crate) fn align_folder<'py>(
     py: Python<'py>,
     path: PathBuf,
     scan: Option<PathBuf>,
     heading: &str,
     #[pyo3(from_py_with = whole::threads)] threads: usize,
+    progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Found<'py>> {
     let heading = heading_of(py, heading)?;
-    let (_, found) = pooled(py, threads, || folder_to_scan(&path, scan.as_deref(), heading))?;
+    let (_, found) = watched(py, threads, "align", progress, |watch| {
+        folder_to_scan_watched(&path, scan.as_deref(), heading, watch)
+    })?;
     Ok(by_scan(py, &found))
 }
 
@@ -157,16 +171,6 @@ fn views_of(
         View::without_picture(name, camera, mask).map_err(|e| from_library(py, e))
     };
     cameras.iter().enumerate().map(view).collect()
-}
-
-/// Points in three columns.
-fn rows(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<Vec<[f64; 3]>> {
-    let allowed = "an (n, 3) array";
-    let (shape, values) = numbers(object, argument, allowed)?;
-    match shape[..] {
-        [_, 3] => Ok(values.as_chunks::<3>().0.to_vec()),
-        _ => Err(bad_value(object.py(), argument, &shape_text(&shape), allowed)),
-    }
 }
 
 fn heading_of(py: Python<'_>, name: &str) -> PyResult<Heading> {

@@ -99,6 +99,16 @@ pub(crate) fn vector<const N: usize>(object: &Bound<'_, PyAny>, argument: &str) 
     Ok(std::array::from_fn(|i| values[i]))
 }
 
+/// Rows of `N` numbers.
+pub(crate) fn rows<const N: usize>(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<Vec<[f64; N]>> {
+    let allowed = format!("an (n, {N}) array");
+    let (shape, values) = numbers(object, argument, &allowed)?;
+    match shape[..] {
+        [_, n] if n == N => Ok(values.as_chunks::<N>().0.to_vec()),
+        _ => Err(bad_value(object.py(), argument, &shape_text(&shape), &allowed)),
+    }
+}
+
 /// A 3x3 matrix, row-major.
 pub(crate) fn matrix3(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<[f64; 9]> {
     let allowed = "a 3x3 matrix";

@@ -1,6 +1,8 @@
 //! `Camera`, and poses from other software's conventions.
 
-use crate::arrays::{matrix3, matrix4, numbers, owned, pose, pose_rows, shape_text, similarity, vector};
+use crate::arrays::{
+    matrix3, matrix4, numbers, owned, pose, pose_rows, rows, shape_text, similarity, vector,
+};
 use crate::errors::{bad_type, bad_value, from_library};
 use crate::parts::{self, CameraParts};
 use crate::whole;
@@ -69,7 +71,8 @@ impl Camera {
         distortion: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let k = matrix3(K, "K")?;
-        let mut camera = Self::from_opencv(K, vehicle_from_camera, width, height, distortion, false)?;
+        let pose = Some(vehicle_from_camera);
+        let mut camera = Self::from_opencv(K, pose, width, height, distortion, false, None, None, None)?;
         (camera.inner.intrinsics.cx, camera.inner.intrinsics.cy) = (k[2], k[5]);
         Ok(camera)
     }
@@ -77,32 +80,126 @@ impl Camera {
     /// From OpenCV's calibration, which puts the centre of the top-left pixel at (0, 0): half a pixel is added to the
     /// principal point.
     ///
-    /// distortion is that of cv2.calibrateCamera or, with fisheye=True, of cv2.fisheye.
+    /// distortion is that of cv2.calibrateCamera or, with fisheye=True, of cv2.fisheye. Instead of the pose, rvec and tvec
+    /// as cv2.solvePnP and cv2.calibrateCamera return them, from the world of the object's points; without
+    /// vehicle_from_world, a 4x4 similarity, that world is the vehicle's frame.
     ///
-    ///     >>> camera = Camera.from_opencv([[600, 0, 319.5], [0, 600, 239.5], [0, 0, 1]], vehicle_from_camera, 640, 480)
+    ///     >>> K = [[600, 0, 319.5], [0, 600, 239.5], [0, 0, 1]]
+    ///     >>> camera = Camera.from_opencv(K, vehicle_from_camera, 640, 480)
     ///     >>> float(camera.K[0, 2])
     ///     320.0
+    ///     >>> rvec, tvec = [0.0, 0.0, 1.5], [0.0, 0.5, 6.0]
+    ///     >>> camera = Camera.from_opencv(K, width=640, height=480, distortion=[-0.1, 0, 0, 0], rvec=rvec, tvec=tvec)
     #[staticmethod]
-    #[pyo3(signature = (K, vehicle_from_camera, width, height, distortion=None, *, fisheye=false))]
+    #[pyo3(signature = (
+        K, vehicle_from_camera=None, width=0, height=0, distortion=None, *,
+        fisheye=false, rvec=None, tvec=None, vehicle_from_world=None
+    ), text_signature = "(K, vehicle_from_camera=None, width=0, height=0, distortion=None, *, fisheye=False, \
+        rvec=None, tvec=None, vehicle_from_world=None)")]
     #[expect(non_snake_case)]
     fn from_opencv(
         K: &Bound<'_, PyAny>,
-        vehicle_from_camera: &Bound<'_, PyAny>,
+        vehicle_from_camera: Option<&Bound<'_, PyAny>>,
         #[pyo3(from_py_with = whole::width)] width: u32,
         #[pyo3(from_py_with = whole::height)] height: u32,
         distortion: Option<&Bound<'_, PyAny>>,
         fisheye: bool,
+        rvec: Option<&Bound<'_, PyAny>>,
+        tvec: Option<&Bound<'_, PyAny>>,
+        vehicle_from_world: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        let py = K.py();
         let model = if fisheye { OpenCvModel::Fisheye } else { OpenCvModel::Standard };
         let distortion = match distortion {
             None => Vec::new(),
             // OpenCV hands out (1, n) and (n, 1) too.
             Some(object) => numbers(object, "distortion", "a list of numbers")?.1,
         };
-        let pose = pose(vehicle_from_camera, "vehicle_from_camera")?;
+        let pose = match (vehicle_from_camera, rvec, tvec) {
+            (Some(matrix), None, None) if vehicle_from_world.is_none() => {
+                pose(matrix, "vehicle_from_camera")?
+            }
+            (None, Some(rvec), Some(tvec)) => opencv_pose(py, rvec, tvec, vehicle_from_world)?,
+            (matrix, ..) => {
+                let found = if matrix.is_some() { "more than one pose" } else { "no whole pose" };
+                let allowed = "vehicle_from_camera, or rvec and tvec";
+                return Err(bad_value(py, "vehicle_from_camera, rvec, tvec", found, allowed));
+            }
+        };
         vg::Camera::from_opencv("camera", &matrix3(K, "K")?, &distortion, model, width, height, pose)
             .map(|inner| Self { inner })
-            .map_err(|e| from_library(K.py(), e))
+            .map_err(|e| from_library(py, e))
+    }
+
+    /// A pinhole camera at eye, a point of the vehicle's frame in metres, whose optical axis meets target. Its picture
+    /// shows fov_y_degrees from top to bottom, and up is up in it. For another lens: with_pose.
+    ///
+    ///     >>> camera = Camera.look_at((6, -4, 1.5), (0, 0, 0.7), 640, 480)
+    ///     >>> camera.project([[0, 0, 0.7]]).round(6)
+    ///     array([[320., 240.]])
+    #[staticmethod]
+    #[pyo3(signature = (eye, target, width, height, *, fov_y_degrees=35.0, up=None),
+        text_signature = "(eye, target, width, height, *, fov_y_degrees=35.0, up=(0.0, 0.0, 1.0))")]
+    fn look_at(
+        eye: &Bound<'_, PyAny>,
+        target: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = whole::width)] width: u32,
+        #[pyo3(from_py_with = whole::height)] height: u32,
+        fov_y_degrees: f64,
+        up: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let (from, to) = (vector::<3>(eye, "eye")?.into(), vector::<3>(target, "target")?.into());
+        let up = up.map_or(Ok([0.0, 0.0, 1.0]), |up| vector::<3>(up, "up"))?;
+        vg::Camera::look_at(from, to, up.into(), fov_y_degrees, width, height)
+            .map(|inner| Self { inner })
+            .map_err(|e| from_library(eye.py(), e))
+    }
+
+    /// The pixels (n, 2), column and row, of points (n, 3) of the vehicle's frame, metres; with depth=True a pair of them
+    /// and the depths (n,) along the optical axis, metres. NaN where the camera has no picture of a point: behind it, and
+    /// beyond the angle at which its lens folds back. The centre of the top-left pixel is (0.5, 0.5); pixels outside 0 to
+    /// width and 0 to height lie beside the picture.
+    ///
+    ///     >>> pixels, depths = camera.project(car.means, depth=True)
+    #[pyo3(signature = (points, depth=false))]
+    fn project<'py>(&self, points: &Bound<'py, PyAny>, depth: bool) -> PyResult<Bound<'py, PyAny>> {
+        let py = points.py();
+        let points = rows::<3>(points, "points")?;
+        let (mut pixels, mut depths) = (Vec::with_capacity(2 * points.len()), Vec::new());
+        for seen in self.inner.pixels_and_depths(&points) {
+            let (pixel, along) = seen.unwrap_or(([f64::NAN; 2], f64::NAN));
+            pixels.extend(pixel);
+            depths.push(along);
+        }
+        let pixels = owned(py, (points.len(), 2), pixels);
+        match depth {
+            false => Ok(pixels.into_any()),
+            true => Ok((pixels, owned(py, points.len(), depths)).into_pyobject(py)?.into_any()),
+        }
+    }
+
+    /// The points (n, 3) of the vehicle's frame, metres, behind pixels (n, 2), column and row, at depths (n,) along the
+    /// optical axis, metres. NaN where a depth is no measurement (0, negative, NaN), and where the lens has no ray.
+    ///
+    ///     >>> point = camera.unproject([[320.0, 240.0]], [6.0])
+    #[pyo3(signature = (pixels, depths))]
+    fn unproject<'py>(
+        &self,
+        pixels: &Bound<'py, PyAny>,
+        depths: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let py = pixels.py();
+        let pixels = rows::<2>(pixels, "pixels")?;
+        let (shape, depths) = numbers(depths, "depths", "an (n,) array")?;
+        if shape != [pixels.len()] {
+            let allowed = format!("({},), one for each pixel", pixels.len());
+            return Err(bad_value(py, "depths", &shape_text(&shape), &allowed));
+        }
+        let point = |(pixel, depth): (&[f64; 2], &f64)| {
+            self.inner.vehicle_from_pixel(*pixel, *depth).map_or([f64::NAN; 3], |point| point.to_array())
+        };
+        let points: Vec<f64> = pixels.iter().zip(&depths).flat_map(point).collect();
+        Ok(owned(py, (pixels.len(), 3), points))
     }
 
     /// The same camera for pictures resized to width x height.
@@ -272,6 +369,42 @@ pub(crate) fn pose_from_colmap<'py>(
     let (qvec_wxyz, translation) = (vector::<4>(qvec, "qvec")?, vector::<3>(tvec, "tvec")?);
     let pose = frame::pose_from_colmap("qvec", qvec_wxyz, translation);
     in_vehicle_frame(qvec.py(), pose, vehicle_from_world)
+}
+
+/// vehicle_from_camera (4x4) of OpenCV's world-to-camera rotation vector and translation, as cv2.solvePnP returns them.
+///
+/// vehicle_from_world is the similarity (4x4) from that world to the vehicle's frame; without, they are one.
+///
+///     >>> vehicle_from_camera = pose_from_opencv([0.0, 0.0, 1.5], [0.0, 0.5, 6.0])
+#[pyfunction]
+#[pyo3(signature = (rvec, tvec, vehicle_from_world=None))]
+pub(crate) fn pose_from_opencv<'py>(
+    rvec: &Bound<'py, PyAny>,
+    tvec: &Bound<'py, PyAny>,
+    vehicle_from_world: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let py = rvec.py();
+    Ok(matrix4(py, &opencv_pose(py, rvec, tvec, vehicle_from_world)?.to_row_major()))
+}
+
+fn opencv_pose(
+    py: Python<'_>,
+    rvec: &Bound<'_, PyAny>,
+    tvec: &Bound<'_, PyAny>,
+    vehicle_from_world: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Pose> {
+    // OpenCV hands out (3, 1).
+    let three = |object, argument| {
+        let allowed = "3 numbers";
+        let (shape, values) = numbers(object, argument, allowed)?;
+        <[f64; 3]>::try_from(values).map_err(|_| bad_value(py, argument, &shape_text(&shape), allowed))
+    };
+    let pose = frame::pose_from_opencv("rvec, tvec", three(rvec, "rvec")?, three(tvec, "tvec")?)
+        .map_err(|e| from_library(py, e))?;
+    match vehicle_from_world {
+        None => Ok(pose),
+        Some(matrix) => Ok(similarity(matrix, "vehicle_from_world")?.transform_pose(&pose)),
+    }
 }
 
 /// vehicle_from_camera (4x4) of a camera-to-world matrix with OpenGL's camera axes (x right, y up, z backward), as in

@@ -1,24 +1,29 @@
 //! `Gaussians`: read-only arrays over the library's memory, pictures, and PLY files.
 
-use crate::arrays::{borrowed, floats, owned, shape_text, similarity, values, vector};
+use crate::arrays::{array, borrowed, floats, owned, shape_text, similarity, values, vector};
 use crate::camera::Camera;
 use crate::errors::{bad_type, bad_value, detached, from_library, pooled};
 use crate::parts;
 use crate::renderer::chosen;
+use crate::watched::watched;
 use crate::whole;
 use numpy::PyUntypedArrayMethods;
 use numpy::ndarray::ArrayView;
 use numpy::{Element, PyArray, PyArray1, PyArray2, PyArray3, PyArrayDescr, PyArrayDescrMethods};
+use pyo3::buffer::PyBuffer;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyDict, PyString, PyType};
+use pyo3::types::{PyBytes, PyDict, PyFunction, PyString, PyType};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
 use std::sync::{Arc, LazyLock};
+use vg::geometry::Turntable;
 use vg::io::ply;
+use vg::progress::Watch;
 use vg::render::backend::{Trainer, trainer};
 use vg::render::{
-    Backend, Background, CpuRenderer, DepthMode, PictureGradient, RenderOptions, Rendered, Renderer,
+    Backend, Background, CpuRenderer, DepthMode, Differentiable, PictureGradient, RenderOptions, Rendered,
+    Renderer,
 };
 
 /// Draws for everybody: keeps its working memory, and the last lens, from picture to picture.
@@ -32,7 +37,8 @@ static RENDERER: LazyLock<CpuRenderer> = LazyLock::new(CpuRenderer::new);
 ///     >>> red = car.sh.copy()
 ///     >>> red[:, 0] = [1.77, -1.77, -1.77]
 ///     >>> car = Gaussians.from_arrays(car.means, car.scales, car.quats, car.opacities, red)
-#[pyclass(module = "vehicle_gaussians", frozen, eq)]
+// A mapping, not a sequence: NumPy is not to take them for nested lists.
+#[pyclass(module = "vehicle_gaussians", frozen, eq, mapping)]
 #[derive(PartialEq)]
 pub(crate) struct Gaussians {
     /// Shared with the renderers that were made of them.
@@ -108,6 +114,86 @@ impl Gaussians {
         pooled(py, 1, || ply::write(&path, &self.inner))
     }
 
+    /// From the bytes of a PLY file in the layout of 3D Gaussian Splatting.
+    ///
+    ///     >>> same = Gaussians.from_ply_bytes(car.to_ply_bytes())
+    #[staticmethod]
+    #[pyo3(signature = (data))]
+    fn from_ply_bytes(py: Python<'_>, data: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let kind = || data.get_type().name().map_or_else(|_| "an object".into(), |n| n.to_string());
+        let buffer = PyBuffer::<u8>::get(data).map_err(|_| bad_type("data", &kind(), "bytes"))?;
+        // A copy: others may write to the memory while the library works.
+        let bytes = buffer.to_vec(py)?;
+        let (inner, _) = pooled(py, 1, || ply::from_bytes(&bytes))?;
+        Ok(Self::of(inner))
+    }
+
+    /// What save_ply writes, as bytes.
+    ///
+    ///     >>> car.to_ply_bytes()[:4]
+    ///     b'ply\n'
+    #[pyo3(signature = ())]
+    fn to_ply_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = pooled(py, 1, || Ok(ply::to_bytes(&self.inner)))?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Those that an index of NumPy's selects of n: a slice, an array of n bools, or of whole numbers, in their order.
+    ///
+    ///     >>> solid = car[car.opacities > 0.5]
+    ///     >>> every_tenth, two = car[::10], car[[3, -1]]
+    fn __getitem__(&self, py: Python<'_>, index: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let n = self.inner.len();
+        static SELECTED: PyOnceLock<Py<PyFunction>> = PyOnceLock::new();
+        let indices = SELECTED.import(py, "vehicle_gaussians._select", "indices")?.call1((index, n))?;
+        let indices = array::<i64>(&indices, "index", "whole numbers")?;
+        let indices: Vec<usize> = values(&indices)?.iter().map(|&i| i as usize).collect();
+        pooled(py, 1, || self.inner.selected(&indices)).map(Self::of)
+    }
+
+    /// Those whose centre lies in the box from low to high, three numbers each, metres, its faces included. Infinite sides
+    /// are open.
+    ///
+    ///     >>> front = car.cropped((0, -10, -10), (10, 10, 10))
+    #[pyo3(signature = (low, high))]
+    fn cropped(&self, low: &Bound<'_, PyAny>, high: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let py = low.py();
+        let [low, high] =
+            [vector::<3>(low, "low")?, vector::<3>(high, "high")?].map(|corner| corner.map(|c| c as f32));
+        pooled(py, 1, || self.inner.cropped(low, high)).map(Self::of)
+    }
+
+    /// Covariance matrices in the vehicle's frame, square metres. (n, 3, 3)
+    ///
+    ///     >>> volumes = np.sqrt(np.linalg.det(car.covariances()))
+    #[pyo3(signature = ())]
+    fn covariances<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        let upper = pooled(py, 1, || Ok(self.inner.covariances()))?;
+        let whole = |[xx, xy, xz, yy, yz, zz]: [f32; 6]| [xx, xy, xz, xy, yy, yz, xz, yz, zz];
+        Ok(owned(py, (upper.len(), 3, 3), upper.into_iter().flat_map(whole).collect()))
+    }
+
+    /// count cameras on a circle around the vehicle, from its front towards its left, each with all of it in its picture.
+    ///
+    ///     >>> pictures = Renderer(car).render_many(car.turntable(36, 320, 240))
+    #[pyo3(signature = (count, width, height, *, elevation_degrees=12.0, fov_y_degrees=35.0))]
+    fn turntable(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = whole::count)] count: usize,
+        #[pyo3(from_py_with = whole::width)] width: u32,
+        #[pyo3(from_py_with = whole::height)] height: u32,
+        elevation_degrees: f64,
+        fov_y_degrees: f64,
+    ) -> PyResult<Vec<Camera>> {
+        let Some((low, high)) = self.inner.bounds() else {
+            return Err(bad_value(py, "turntable", "no Gaussians", "at least one to walk around"));
+        };
+        let table = Turntable { elevation_degrees, fov_y_degrees };
+        let cameras = table.cameras(low, high, count, width, height).map_err(|e| from_library(py, e))?;
+        Ok(cameras.into_iter().map(|inner| Camera { inner }).collect())
+    }
+
     /// The mirror image across the plane of symmetry, y = 0.
     ///
     ///     >>> car.mirrored().mirrored() == car
@@ -171,7 +257,8 @@ impl Gaussians {
         let options =
             RenderOptions { background, antialiased, near, far, sh_degree, ..RenderOptions::default() };
         let camera = &camera.get().inner;
-        let mut drawn = pooled(py, threads, || RENDERER.render(&self.inner, camera, &options))?;
+        let draw = |watch: &Watch| RENDERER.watched(watch).render(&self.inner, camera, &options);
+        let mut drawn = watched(py, threads, "render", None, draw)?;
         let size = (drawn.height as usize, drawn.width as usize);
         let picture = match (kind, background) {
             (Kind::Bytes, Background::Color(_)) => picture(py, size, drawn.to_rgb8()),
@@ -213,8 +300,11 @@ impl Gaussians {
             RenderOptions { antialiased, near, far, sh_degree, ..planes(py, background, depth_mode)? };
         let camera = &camera.get().inner;
         let device = device(py, backend)?;
-        let renderer = device.as_deref().unwrap_or(&*RENDERER);
-        let drawn = pooled(py, threads, || renderer.render(&self.inner, camera, &options))?;
+        let draw = |watch: &Watch| match &device {
+            Some(device) => device.render(&self.inner, camera, &options),
+            None => RENDERER.watched(watch).render(&self.inner, camera, &options),
+        };
+        let drawn = watched(py, threads, "render", None, draw)?;
         let size = (drawn.height as usize, drawn.width as usize);
         static PLANES: PyOnceLock<Py<PyType>> = PyOnceLock::new();
         PLANES.import(py, "vehicle_gaussians._gradients", "Planes")?.call1((
@@ -270,8 +360,11 @@ impl Gaussians {
             depth: plane::<1>(depth, "depth", size)?,
         };
         let device = device(py, backend)?;
-        let renderer = device.as_deref().unwrap_or(&*RENDERER);
-        let g = pooled(py, threads, || renderer.backward(&self.inner, camera, &options, &gradient))?;
+        let back = |watch: &Watch| match &device {
+            Some(device) => device.backward(&self.inner, camera, &options, &gradient),
+            None => RENDERER.watched(watch).backward(&self.inner, camera, &options, &gradient),
+        };
+        let g = watched(py, threads, "render", None, back)?;
         let n = self.inner.len();
         let pose = [g.pose.rotation, g.pose.translation].map(|v| v.to_array()).concat();
         static GRADIENTS: PyOnceLock<Py<PyType>> = PyOnceLock::new();

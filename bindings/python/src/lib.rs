@@ -14,8 +14,10 @@ mod metrics;
 mod model;
 mod parts;
 mod reconstruct;
+mod refine;
 mod renderer;
 mod scene;
+mod watched;
 mod whole;
 
 use pyo3::prelude::*;
@@ -25,7 +27,9 @@ mod _native {
     #[pymodule_export]
     use crate::align::{align_box, align_folder, align_points, align_scan};
     #[pymodule_export]
-    use crate::camera::{Camera, pose_from_box, pose_from_colmap, pose_from_opengl, similarity_from_points};
+    use crate::camera::{
+        Camera, pose_from_box, pose_from_colmap, pose_from_opencv, pose_from_opengl, similarity_from_points,
+    };
     #[pymodule_export]
     use crate::errors::panic_on_a_worker_thread;
     #[pymodule_export]
@@ -38,6 +42,8 @@ mod _native {
     use crate::parts::camera;
     #[pymodule_export]
     use crate::reconstruct::reconstruct;
+    #[pymodule_export]
+    use crate::refine::refine;
     #[pymodule_export]
     use crate::renderer::Renderer;
     #[pymodule_export]

@@ -6,11 +6,12 @@ use crate::errors::{bad_value, from_library, pooled, renamed};
 use crate::gaussians::Gaussians;
 use crate::model::Model;
 use crate::reconstruct::{depth, mask, picture};
+use crate::watched::watched;
 use crate::whole;
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 use vg::View;
-use vg::metrics::{Lpips, SurfaceErrors, SurfaceOptions, ViewErrors, psnr, ssim};
+use vg::metrics::{Lpips, SurfaceErrors, SurfaceOptions, ViewErrors, check_colors, psnr, ssim};
 use vg::render::{CpuRenderer, RenderOptions, Renderer};
 
 /// PSNR, SSIM, LPIPS.
@@ -65,8 +66,9 @@ pub(crate) fn view_errors(
     let view = View { name: String::new(), camera, image, mask, depth };
     let network = lpips.map(|model| model.get().inner.clone());
     let gaussians = &gaussians.get().inner;
-    pooled(py, threads, || {
-        let drawn = CpuRenderer::new().render(gaussians, &camera, &RenderOptions::default())?;
+    watched(py, threads, "measure", None, |watch| {
+        let drawn =
+            CpuRenderer::new().watched(watch).render(gaussians, &camera, &RenderOptions::default())?;
         let lpips = match network.map(Lpips::new).transpose()? {
             Some(lpips) => lpips.of(&drawn, &view)?,
             None => None,
@@ -94,8 +96,8 @@ pub(crate) fn surface_errors(
     let options = SurfaceOptions { f_score_m: f_score, ..SurfaceOptions::default() };
     options.validate().map_err(|e| from_library(py, e))?;
     let gaussians = &gaussians.get().inner;
-    let e = pooled(py, threads, || {
-        SurfaceErrors::with(gaussians, &points, &options).map_err(|e| renamed(e, "scan", "points"))
+    let e = watched(py, threads, "measure", None, |watch| {
+        SurfaceErrors::watched(gaussians, &points, &options, watch).map_err(|e| renamed(e, "scan", "points"))
     })?;
     Ok([
         e.accuracy_m,
@@ -122,9 +124,6 @@ fn on_white(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<(Vec<[f32; 3]
         let array = self::floats(object, argument, ALLOWED)?;
         (floats, shape) = (values(&array)?.to_vec(), array.shape().to_vec());
     }
-    if let Some(bad) = floats.iter().find(|v| !v.is_finite()) {
-        return Err(bad_value(object.py(), argument, &bad.to_string(), "finite"));
-    }
     const SIDES: std::ops::RangeInclusive<usize> = 1..=vg::geometry::camera::MAX_SIDE as usize;
     let [height, width, channels @ (3 | 4)] = shape[..] else {
         let allowed = "(height, width, 3 or 4)";
@@ -134,6 +133,7 @@ fn on_white(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<(Vec<[f32; 3]
         let allowed = format!("sides of 1 to {}", SIDES.end());
         return Err(bad_value(object.py(), argument, &shape_text(&shape), &allowed));
     }
+    check_colors(argument, &floats, width, channels).map_err(|e| from_library(object.py(), e))?;
     let pixel = |p: &[f32]| {
         let alpha = p.get(3).map_or(1.0, |a| a.clamp(0.0, 1.0));
         [p[0], p[1], p[2]].map(|c| alpha * c + (1.0 - alpha))

@@ -6,12 +6,12 @@ use crate::errors::{bad_type, bad_value, detached, from_library};
 use crate::gaussians::Gaussians;
 use crate::model::Model;
 use crate::renderer::chosen;
+use crate::watched::Teller;
 use crate::whole;
 use numpy::{PyArray2, PyUntypedArray, PyUntypedArrayMethods};
-use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
-use pyo3::types::PyString;
-use std::ops::ControlFlow;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyFunction;
 use vg::pipeline::{Calibrate, Keep, Options, PriorChoice};
 use vg::progress::Progress;
 use vg::refine::{Amount, RefineOptions};
@@ -60,7 +60,7 @@ pub(crate) fn reconstruct<'py>(
     refine_backend: &str,
     #[pyo3(from_py_with = whole::threads)] threads: usize,
     names: Option<Vec<String>>,
-    progress: Option<Py<PyAny>>,
+    progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Gaussians, String, Option<Points<'py>>)> {
     let options = Options {
         prior: parse_prior(py, prior)?,
@@ -88,16 +88,10 @@ pub(crate) fn reconstruct<'py>(
     let mut scene = scene_of(py, &images, masks.as_deref(), &cameras, depths.as_deref(), names)?;
     scene.cloud = cloud.map_or(Ok(None), self::cloud)?;
 
+    let teller = Teller::new(progress)?;
     let mut raised = None;
     let made = detached(py, || {
-        let mut tell = |state: Progress| match Python::attach(|py| goes_on(py, progress.as_ref(), state)) {
-            Ok(true) => ControlFlow::Continue(()),
-            Ok(false) => ControlFlow::Break(()),
-            Err(error) => {
-                raised = Some(error);
-                ControlFlow::Break(())
-            }
-        };
+        let mut tell = |state: Progress| teller.tell(state, &mut raised);
         let made = vg::pipeline::reconstruct(&scene, &options, &mut tell)?;
         // Nothing to say here if the library cannot write its own report: it is no part of the vehicle.
         let report = serde_json::to_string(&made.report).unwrap_or_default();
@@ -145,16 +139,7 @@ fn refinement(
     }
 }
 
-/// Whether to go on: not after Ctrl-C, an exception of the caller's function, or its true value.
-fn goes_on(py: Python<'_>, progress: Option<&Py<PyAny>>, state: Progress) -> PyResult<bool> {
-    py.check_signals()?;
-    match progress {
-        None => Ok(true),
-        Some(function) => Ok(!function.bind(py).call1((state.stage, state.fraction))?.is_truthy()?),
-    }
-}
-
-fn scene_of(
+pub(crate) fn scene_of(
     py: Python<'_>,
     images: &[Bound<'_, PyAny>],
     masks: Option<&[Bound<'_, PyAny>]>,
@@ -296,11 +281,8 @@ fn same_size(py: Python<'_>, argument: &str, shape: &[usize], camera: &vg::Camer
 
 /// Something that is legal but looks like a mistake.
 pub(crate) fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
-    let text = PyString::new(py, text);
-    // The line that called vehicle_gaussians.reconstruct or open_scene.
-    const CALLER: i32 = 2;
-    let warnings = py.import("warnings")?;
-    warnings.call_method1("warn", (text, py.get_type::<PyUserWarning>(), CALLER))?;
+    static WARN: PyOnceLock<Py<PyFunction>> = PyOnceLock::new();
+    WARN.import(py, "vehicle_gaussians._warn", "warn")?.call1((text,))?;
     Ok(())
 }
 

@@ -1,9 +1,10 @@
 //! `Renderer`: Gaussians made ready to be drawn many times, by the CPU or a graphics processor.
 
 use crate::camera::Camera;
-use crate::errors::{bad_value, detached, pooled};
+use crate::errors::{bad_value, detached};
 use crate::gaussians::{Gaussians, parse_background, picture};
 use crate::parts::stays_here;
+use crate::watched::watched;
 use crate::whole;
 use pyo3::prelude::*;
 use std::sync::Arc;
@@ -65,18 +66,20 @@ impl Renderer {
         let options = options(background, antialiased, [near, far], sh_degree)?;
         let camera = &camera.get().inner;
         let mut drawn = Rgba8::default();
-        pooled(py, threads, || self.ready.render_into(camera, &options, &mut drawn))?;
+        watched(py, threads, "render", None, |watch| {
+            self.ready.render_into_watched(camera, &options, &mut drawn, watch)
+        })?;
         Ok(array(py, camera, &options, drawn.pixels))
     }
 
     /// The pictures of several cameras, a list of what render gives. A graphics processor draws one while the picture
-    /// before it is copied.
+    /// before it is copied. progress is as for reconstruct, with the one stage "render".
     ///
     ///     >>> pictures = Renderer(car).render_many(cameras)
     #[pyo3(signature = (
-        cameras, background=None, threads=0, *, antialiased=false, near=0.01, far=1e10, sh_degree=3
+        cameras, background=None, threads=0, *, antialiased=false, near=0.01, far=1e10, sh_degree=3, progress=None
     ), text_signature = "(self, cameras, background='white', threads=0, *, antialiased=False, near=0.01, far=1e10, \
-        sh_degree=3)")]
+        sh_degree=3, progress=None)")]
     fn render_many<'py>(
         &self,
         py: Python<'py>,
@@ -87,12 +90,13 @@ impl Renderer {
         near: f32,
         far: f32,
         #[pyo3(from_py_with = whole::sh_degree)] sh_degree: u8,
+        progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let options = options(background, antialiased, [near, far], sh_degree)?;
         let cameras: Vec<_> = cameras.iter().map(|camera| camera.get().inner.clone()).collect();
         let mut drawn = Vec::with_capacity(cameras.len());
-        pooled(py, threads, || {
-            self.ready.render_each(&cameras, &options, &mut Rgba8::default(), |_, picture| {
+        watched(py, threads, "render", progress, |watch| {
+            self.ready.render_each_watched(&cameras, &options, &mut Rgba8::default(), watch, |_, picture| {
                 drawn.push(picture.pixels.clone());
                 Ok(())
             })

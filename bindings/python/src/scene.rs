@@ -2,12 +2,14 @@
 
 use crate::arrays::{owned, similarity};
 use crate::camera::Camera;
-use crate::errors::{from_library, pooled};
+use crate::errors::from_library;
 use crate::reconstruct::warn;
+use crate::watched::watched;
 use numpy::{PyArray2, PyArray3};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use vg::io::{self, SceneOptions};
+use vg::progress::Watch;
 use vg::scene::mask::Label;
 
 /// Images, masks, depths, cameras and names, a list each; `None` for a mask or a depth map that is not there.
@@ -20,7 +22,7 @@ type Lists<'py> = (
 );
 
 #[pyfunction]
-#[pyo3(signature = (path, views, vehicle_from_world, depth_scale, load_depth))]
+#[pyo3(signature = (path, views, vehicle_from_world, depth_scale, load_depth, progress))]
 pub(crate) fn open_scene<'py>(
     py: Python<'py>,
     path: PathBuf,
@@ -28,6 +30,7 @@ pub(crate) fn open_scene<'py>(
     vehicle_from_world: Option<&Bound<'py, PyAny>>,
     depth_scale: Option<f64>,
     load_depth: bool,
+    progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Lists<'py>> {
     const ARGUMENT: &str = "vehicle_from_world";
     let vehicle_from_world = match vehicle_from_world {
@@ -38,7 +41,8 @@ pub(crate) fn open_scene<'py>(
         }),
     };
     let options = SceneOptions { views, vehicle_from_world, depth_scale, load_depth, format: None };
-    let files = pooled(py, 0, || io::open_scene(&path, &options))?;
+    let read = |watch: &Watch| io::open_scene_watched(&path, &options, watch);
+    let files = watched(py, 0, "read", progress, read)?;
     for note in &files.notes {
         warn(py, note)?;
     }

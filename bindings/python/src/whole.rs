@@ -33,6 +33,16 @@ pub(crate) fn y(object: &Bound<'_, PyAny>) -> PyResult<u32> {
     whole(object, "y", "a row of the picture, 0 or above")
 }
 
+/// How many cameras of a turntable.
+pub(crate) fn count(object: &Bound<'_, PyAny>) -> PyResult<usize> {
+    whole(object, "count", "1 to 100000")
+}
+
+/// `iterations` of a refinement, or None.
+pub(crate) fn iterations(object: &Bound<'_, PyAny>) -> PyResult<Option<u32>> {
+    given(object, |object| whole(object, "iterations", "1 to 1000000"))
+}
+
 /// `max_views`, or None.
 pub(crate) fn max_views(object: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
     given(object, |object| whole(object, "max_views", "at least 1"))

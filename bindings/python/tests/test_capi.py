@@ -34,6 +34,7 @@ ENUMERATIONS = {
     "vg_calibrate": capi.Calibrate,
     "vg_symmetry": capi.Symmetry,
     "vg_relight": capi.Relight,
+    "vg_refine_stop": capi.RefineStop,
     "vg_heading": capi.Heading,
     "vg_keep": capi.Keep,
     "vg_log_level": capi.LogLevel,
@@ -286,7 +287,7 @@ def test_progress_cancels_logs_and_passes_exceptions_through(ellipsoid: Views) -
 
     def cancel(stage: str, fraction: float) -> bool:
         stages.append(stage)
-        return stage == "head"
+        return stage != "head"
 
     with pytest.raises(vg.VgError, match="cancelled during head") as caught:
         capi.reconstruct(*views, progress=cancel, log=lambda level, line: lines.append((level, line)))

@@ -27,7 +27,17 @@ from vehicle_gaussians import capi
 STUB = REPOSITORY / "bindings" / "python" / "python" / "vehicle_gaussians" / "_native.pyi"
 NATIVE = [name for name in vg.__all__ if getattr(vg, name) is getattr(vg._native, name, None) and name[0] != "_"]
 #: Tuples of results, for which editors show the fields.
-RESULTS = [vg.Alignment, vg.Gradients, vg.PictureErrors, vg.Planes, vg.Points, vg.SurfaceErrors, vg.ViewErrors]
+RESULTS = [
+    vg.Alignment,
+    vg.Gradients,
+    vg.PictureErrors,
+    vg.Planes,
+    vg.Points,
+    vg.Refined,
+    vg.SurfaceErrors,
+    vg.ViewErrors,
+    vg.ViewScore,
+]
 
 
 def members(thing: Any) -> Iterator[tuple[str, Any]]:
@@ -85,8 +95,13 @@ def test_the_examples_run(
         "image": np.zeros((150, 200, 3), np.uint8),
         "mask": vg.Renderer(made.gaussians, "cpu").render(ellipsoid.cameras[0].scaled(200, 150)).min(axis=2) < 255,
         "scan": made.gaussians.means,
+        "made": made,
+        "scene": vg.Scene(
+            ellipsoid.images, list(ellipsoid.masks), list(ellipsoid.depths), ellipsoid.cameras, list(INPUTS)
+        ),
     }
-    documented = [*calls(), ("vehicle_gaussians", vg), ("vehicle_gaussians.capi", capi), ("VgError", vg.VgError)]
+    modules = [("vehicle_gaussians", vg), ("vehicle_gaussians.capi", capi)]
+    documented = [*calls(), *modules, ("VgError", vg.VgError), ("Report", vg.Report)]
     said: list[str] = []
     ran = 0
     for name, thing in documented:

@@ -58,6 +58,26 @@ def test_pictures_are_measured_as_the_formulas_say(face: Any, ellipsoid: Views) 
 
 
 @pytest.mark.parametrize("face", FACES)
+def test_pictures_of_another_range_are_refused_or_measured_in_theirs(face: Any, ellipsoid: Views) -> None:
+    a, b = ellipsoid.images[0], noisy(ellipsoid.images[0])
+    expected = face.picture_errors(a, b)
+    floats = [picture.astype(np.float32) for picture in (a, b)]
+    words = r"^a(\[0, 0\]|, column 0, row 0): .*255.*; allowed: 0 to 1, and at most 1 beyond"
+    with pytest.raises(ValueError, match=words):
+        face.picture_errors(*floats)
+    with pytest.raises(ValueError, match="^b"):
+        face.picture_errors(floats[0] / 255, np.where(floats[1] > 250, np.float32(-1.5), floats[1] / 255))
+    assert face.picture_errors(*floats, data_range=255) == pytest.approx(expected[:2] + (None,), abs=1e-6)
+    assert face.picture_errors(a, b, data_range=255.0) == pytest.approx(expected[:2] + (None,), abs=1e-6)
+    # White that overshoots is white.
+    over = [np.where(picture == 255, np.float32(1.5), picture / np.float32(255)) for picture in floats]
+    assert face.picture_errors(*over).psnr_db == pytest.approx(expected.psnr_db, abs=1e-4)
+    for bad in (0, -1.0, np.inf, np.nan):
+        with pytest.raises(ValueError, match="^data_range: "):
+            face.picture_errors(a, b, data_range=bad)
+
+
+@pytest.mark.parametrize("face", FACES)
 def test_what_a_view_does_not_have_is_none(face: Any, ellipsoid: Views) -> None:
     model = ball(face, ellipsoid)
     errors = face.view_errors(model, ellipsoid.images[0], None, ellipsoid.cameras[0])

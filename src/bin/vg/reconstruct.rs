@@ -51,8 +51,9 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
 
 /// What a user should hear of a reconstruction that went well.
 pub(crate) fn note_warnings(report: &Report) {
-    for warning in report.warnings() {
-        note(&warning);
+    let of_network = report.network.iter().flat_map(|network| &network.warnings);
+    for warning in report.warnings.iter().chain(of_network) {
+        note(warning);
     }
 }
 

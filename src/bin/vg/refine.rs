@@ -38,7 +38,7 @@ pub(crate) fn run(args: &RefineArgs) -> Result {
         backend: args.backend,
         ..RefineOptions::default()
     };
-    let bar = Bar::of_refinement();
+    let bar = Bar::of_reconstruction();
     let mut show = |progress| bar.show(progress);
     let (refined, done) = refine::model(&gaussians, &opened.scene, &settings, args.threads, &mut show)?;
     drop(bar);

@@ -5,12 +5,8 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 use vg::progress::Progress;
 
-/// Steps of the bar per stage.
-const STEPS: u64 = 100;
-
-/// The stages in order, as a reconstruction reports them; no kind has all.
-const STAGES: [&str; 10] =
-    ["plan", "undistort", "calibrate", "prior", "pixels", "head", "symmetry", "start", "refine", "check"];
+/// Steps of the bar of a reconstruction: finer than columns of a terminal.
+const STEPS: u64 = 1000;
 
 /// What a bar of stages looks like.
 const STAGE: &str = "{wide_bar} {msg:9} {elapsed:>4}";
@@ -18,22 +14,12 @@ const STAGE: &str = "{wide_bar} {msg:9} {elapsed:>4}";
 /// A bar on standard error, where that is a terminal; else nothing.
 pub(crate) struct Bar {
     bar: ProgressBar,
-    /// The stage it begins with.
-    first: usize,
 }
 
 impl Bar {
-    /// Of one reconstruction.
+    /// Of one reconstruction, or of a refinement alone.
     pub(crate) fn of_reconstruction() -> Self {
-        Self::with(STAGES.len() as u64 * STEPS, STAGE)
-    }
-
-    /// Of a refinement alone: of the stages, it has the one.
-    pub(crate) fn of_refinement() -> Self {
-        let first = STAGES.iter().position(|s| *s == "refine").unwrap_or(0);
-        let mut bar = Self::with(STEPS, STAGE);
-        bar.first = first;
-        bar
+        Self::with(STEPS, STAGE)
     }
 
     /// Of `n` pictures.
@@ -47,7 +33,7 @@ impl Bar {
             bar.set_style(style);
         }
         bar.enable_steady_tick(Duration::from_millis(200));
-        Self { bar, first: 0 }
+        Self { bar }
     }
 
     /// Where a reconstruction stands.
@@ -56,11 +42,7 @@ impl Bar {
             Some(loss) => self.bar.set_message(format!("{}, loss {loss:.5}", progress.stage)),
             None => self.bar.set_message(progress.stage),
         }
-        if let Some(stage) = STAGES.iter().position(|s| *s == progress.stage) {
-            self.bar.set_position(
-                stage.saturating_sub(self.first) as u64 * STEPS + (progress.fraction * STEPS as f64) as u64,
-            );
-        }
+        self.bar.set_position((progress.overall * STEPS as f64) as u64);
         ControlFlow::Continue(())
     }
 

@@ -15,6 +15,7 @@ mod strays;
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
 use crate::geometry::nearest::Nearest;
+use crate::progress::{UNWATCHED, Watch};
 use crate::scene::Cloud;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -80,6 +81,9 @@ pub struct SurfaceErrors {
     pub height_error_percent: f64,
 }
 
+/// Which part of the work is done when the model has been looked at from all around, by the time that it takes.
+const SEEN: f64 = 0.7;
+
 /// The share of points that may lie beyond either end of a side: strays so near to the vehicle that they were not
 /// known for strays. More would cut off mirrors.
 const BEYOND: f64 = 0.0005;
@@ -98,9 +102,24 @@ impl SurfaceErrors {
     /// # Errors
     /// As [`SurfaceErrors::of`].
     pub fn with(gaussians: &Gaussians, scan: &[[f32; 3]], options: &SurfaceOptions) -> Result<Self> {
+        Self::watched(gaussians, scan, options, &UNWATCHED)
+    }
+
+    /// The same under `watch`.
+    ///
+    /// # Errors
+    /// As [`SurfaceErrors::of`], and [`Error::Cancelled`].
+    pub fn watched(
+        gaussians: &Gaussians,
+        scan: &[[f32; 3]],
+        options: &SurfaceOptions,
+        watch: &Watch,
+    ) -> Result<Self> {
         options.validate()?;
         Cloud::check("scan", scan)?;
-        Self::between(&visible_surface(gaussians, options.cell_m)?, scan, options)
+        let model = surface(gaussians, options.cell_m, watch)?;
+        watch.report(SEEN)?;
+        Self::compared(&model, scan, options, watch)
     }
 
     /// Of points on one surface, which are all taken for the model's, against a scan, which may have strays.
@@ -111,14 +130,27 @@ impl SurfaceErrors {
         options.validate()?;
         Cloud::check("model", model)?;
         Cloud::check("scan", scan)?;
+        Self::compared(model, scan, options, &UNWATCHED)
+    }
+
+    /// Of points and options that were checked.
+    fn compared(
+        model: &[[f32; 3]],
+        scan: &[[f32; 3]],
+        options: &SurfaceOptions,
+        watch: &Watch,
+    ) -> Result<Self> {
         let model = grid::thinned(model, options.cell_m);
-        let scan = grid::thinned(&strays::removed(scan), options.cell_m);
-        let there = distances(&model, &scan, options.reach_m);
-        let back = distances(&scan, &model, options.reach_m);
+        let scan = grid::thinned(&strays::removed(scan, watch), options.cell_m);
+        watch.check()?;
+        let there = distances(&model, &scan, options.reach_m, watch);
+        let back = distances(&scan, &model, options.reach_m, watch);
+        watch.check()?;
         let (accuracy_m, completeness_m) = (mean(&there), mean(&back));
         let (precision, recall) = (share(&there, options.f_score_m), share(&back, options.f_score_m));
         let both = precision + recall;
-        let of_model = extents(&strays::removed(&model));
+        let of_model = extents(&strays::removed(&model, watch));
+        watch.check()?;
         let of_scan = extents(&scan);
         let [length, width, height] = std::array::from_fn(|k| {
             if of_scan[k] > 0.0 { 100.0 * (of_model[k] / of_scan[k] - 1.0) } else { 0.0 }
@@ -142,7 +174,12 @@ impl SurfaceErrors {
 /// # Errors
 /// A model without Gaussians, or one of which nothing is seen.
 pub fn visible_surface(gaussians: &Gaussians, cell_m: f64) -> Result<Vec<[f32; 3]>> {
-    let points = grid::thinned(&seen::points(gaussians, cell_m)?, cell_m);
+    surface(gaussians, cell_m, &UNWATCHED)
+}
+
+/// As [`visible_surface`], under `watch`.
+fn surface(gaussians: &Gaussians, cell_m: f64, watch: &Watch) -> Result<Vec<[f32; 3]>> {
+    let points = grid::thinned(&seen::points(gaussians, cell_m, watch)?, cell_m);
     if points.is_empty() {
         let found = "nothing with an alpha of 0.5 from any side";
         return Err(Error::argument("gaussians", found, "a surface that can be seen"));
@@ -151,9 +188,12 @@ pub fn visible_surface(gaussians: &Gaussians, cell_m: f64) -> Result<Vec<[f32; 3
 }
 
 /// From each point to the nearest of the others, at most `reach`.
-fn distances(points: &[[f32; 3]], others: &[[f32; 3]], reach: f64) -> Vec<f64> {
+fn distances(points: &[[f32; 3]], others: &[[f32; 3]], reach: f64, watch: &Watch) -> Vec<f64> {
     let tree = Nearest::of_f32(others);
     let distance = |p: &[f32; 3]| {
+        if watch.is_stopped() {
+            return reach;
+        }
         tree.nearest(DVec3::from_array(p.map(f64::from))).map_or(reach, |n| n.squared.sqrt().min(reach))
     };
     points.par_iter().map(distance).collect()

@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
 use crate::geometry::{Camera, Intrinsics, Pose};
+use crate::progress::Watch;
 use crate::render::{CpuRenderer, RenderOptions, Rendered, Renderer};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -27,7 +28,7 @@ const BEYOND: f64 = 0.002;
 const PIXELS: f64 = 1.3;
 
 /// Points on the surface, vehicle frame, metres, closer than `cell` where a camera looks at it squarely.
-pub(super) fn points(gaussians: &Gaussians, cell: f64) -> Result<Vec<[f32; 3]>> {
+pub(super) fn points(gaussians: &Gaussians, cell: f64, watch: &Watch) -> Result<Vec<[f32; 3]>> {
     if gaussians.is_empty() {
         return Err(Error::argument("gaussians", "none", "at least one"));
     }
@@ -39,7 +40,8 @@ pub(super) fn points(gaussians: &Gaussians, cell: f64) -> Result<Vec<[f32; 3]>> 
         cameras.map(|(elevation, azimuth)| camera(middle, radius, cell, elevation, azimuth)).collect();
     // Colour is not looked at.
     let options = RenderOptions { sh_degree: 0, ..RenderOptions::default() };
-    let renderer = CpuRenderer::new();
+    let cpu = CpuRenderer::new();
+    let renderer = cpu.watched(watch);
     let seen = |camera: &Camera| Ok(lifted(&renderer.render(gaussians, camera, &options)?, camera));
     let seen: Result<Vec<Vec<[f32; 3]>>> = cameras?.par_iter().map(seen).collect();
     Ok(seen?.concat())

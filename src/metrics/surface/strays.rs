@@ -1,6 +1,7 @@
 //! Points of a scan that stand alone: dust, reflections, what a scanner saw between two surfaces.
 
 use crate::geometry::nearest::Nearest;
+use crate::progress::Watch;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -11,9 +12,12 @@ const NEIGHBOUR: usize = 8;
 const FACTOR: f64 = 3.0;
 
 /// Without the points whose eighth neighbour is more than three times as far as that of the middle of all.
-pub(super) fn removed(points: &[[f32; 3]]) -> Vec<[f32; 3]> {
+pub(super) fn removed(points: &[[f32; 3]], watch: &Watch) -> Vec<[f32; 3]> {
     let tree = Nearest::of_f32(points);
     let far = |p: &[f32; 3]| {
+        if watch.is_stopped() {
+            return 0.0;
+        }
         // The point itself is among the nearest.
         let near = tree.k_nearest(DVec3::from_array(p.map(f64::from)), NEIGHBOUR + 1);
         near.last().map_or(0.0, |n| n.squared)
@@ -31,6 +35,7 @@ pub(super) fn removed(points: &[[f32; 3]]) -> Vec<[f32; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::progress::UNWATCHED;
 
     #[test]
     fn points_that_stand_alone_go_and_thin_surfaces_stay() {
@@ -39,13 +44,17 @@ mod tests {
         let thin = (0..64).map(|i| [60.0 + 1.4 * (i % 8) as f32, 1.4 * (i / 8) as f32, 0.0]);
         let strays = (0..5).map(|i| [i as f32 * 10.0, 20.0, 30.0]);
         let points: Vec<[f32; 3]> = wall.chain(thin).chain(strays).collect();
-        assert!(removed(&points) == points[..1664], "{} left", removed(&points).len());
+        assert!(
+            removed(&points, &UNWATCHED) == points[..1664],
+            "{} left",
+            removed(&points, &UNWATCHED).len()
+        );
     }
 
     #[test]
     fn few_points_and_points_in_one_place_stay() {
         for points in [vec![], vec![[1.0; 3]], vec![[0.0; 3], [9.0; 3]], vec![[2.0; 3]; 100]] {
-            assert_eq!(removed(&points), points);
+            assert_eq!(removed(&points, &UNWATCHED), points);
         }
     }
 }

@@ -2,10 +2,11 @@
 
 use super::backward::{self, BackwardTimes};
 use super::simd::Lanes;
-use super::{CpuRenderer, Level, Scratch, StageTimes};
+use super::{CpuRenderer, Level, Scratch, StageTimes, Watched};
 use crate::error::Result;
 use crate::gaussians::Gaussians;
 use crate::geometry::Camera;
+use crate::progress::{UNWATCHED, Watch};
 use crate::render::{Differentiable, Gradients, PictureGradient, RenderOptions, Rendered};
 use std::time::{Duration, Instant};
 
@@ -53,29 +54,8 @@ impl CpuRenderer {
         (picture, of_picture, gradients): (&mut Rendered, &mut PictureGradient, &mut Gradients),
         loss: impl FnOnce(&Rendered, &mut PictureGradient) -> Result<()>,
     ) -> Result<GradientTimes> {
-        camera.validate("camera")?;
-        options.validate()?;
-        let largest = |picture: &Rendered, of_picture: &mut PictureGradient| {
-            of_picture.reset(picture);
-            loss(picture, of_picture)?;
-            of_picture.validate(camera)
-        };
-        if camera.distortion.is_none() {
-            let targets = (picture, of_picture, gradients);
-            return self.pinhole_both_ways(gaussians, camera, options, targets, largest);
-        }
-        let map = self.lens_map(camera)?;
-        let (pinhole, fine) = map.pinhole(camera, options);
-        let (mut fine_picture, mut of_fine) = (Rendered::default(), PictureGradient::default());
-        let mut background = [0.0; 3];
-        let through_lens = |fine: &Rendered, of_fine: &mut PictureGradient| {
-            background = map.loss(options, (fine, &mut *of_fine), (picture, of_picture), largest)?;
-            of_fine.validate(&pinhole)
-        };
-        let targets = (&mut fine_picture, &mut of_fine, &mut *gradients);
-        self.pinhole_both_ways(gaussians, &pinhole, &fine, targets, through_lens)?;
-        gradients.background = background;
-        Ok(GradientTimes::default())
+        let targets = (picture, of_picture, gradients);
+        self.watched(&UNWATCHED).both_ways_with(gaussians, camera, options, targets, loss)
     }
 
     /// The way back from what pixels have for each Gaussian, where they were drawn and summed up elsewhere; the
@@ -100,6 +80,42 @@ impl CpuRenderer {
             }
         }
     }
+}
+
+impl Watched<'_> {
+    /// See [`CpuRenderer::render_with_gradients_into`].
+    fn both_ways_with(
+        &self,
+        gaussians: &Gaussians,
+        camera: &Camera,
+        options: &RenderOptions,
+        (picture, of_picture, gradients): (&mut Rendered, &mut PictureGradient, &mut Gradients),
+        loss: impl FnOnce(&Rendered, &mut PictureGradient) -> Result<()>,
+    ) -> Result<GradientTimes> {
+        camera.validate("camera")?;
+        options.validate()?;
+        let largest = |picture: &Rendered, of_picture: &mut PictureGradient| {
+            of_picture.reset(picture);
+            loss(picture, of_picture)?;
+            of_picture.validate(camera)
+        };
+        if camera.distortion.is_none() {
+            let targets = (picture, of_picture, gradients);
+            return self.pinhole_both_ways(gaussians, camera, options, targets, largest);
+        }
+        let map = self.renderer.lens_map(camera)?;
+        let (pinhole, fine) = map.pinhole(camera, options);
+        let (mut fine_picture, mut of_fine) = (Rendered::default(), PictureGradient::default());
+        let mut background = [0.0; 3];
+        let through_lens = |fine: &Rendered, of_fine: &mut PictureGradient| {
+            background = map.loss(options, (fine, &mut *of_fine), (picture, of_picture), largest)?;
+            of_fine.validate(&pinhole)
+        };
+        let targets = (&mut fine_picture, &mut of_fine, &mut *gradients);
+        self.pinhole_both_ways(gaussians, &pinhole, &fine, targets, through_lens)?;
+        gradients.background = background;
+        Ok(GradientTimes::default())
+    }
 
     /// Of a valid camera without a lens; `loss` as in [`both_ways`].
     fn pinhole_both_ways(
@@ -110,18 +126,20 @@ impl CpuRenderer {
         targets: (&mut Rendered, &mut PictureGradient, &mut Gradients),
         loss: impl FnOnce(&Rendered, &mut PictureGradient) -> Result<f32>,
     ) -> Result<GradientTimes> {
-        let mut scratch = self.pool().pop().unwrap_or_default();
-        let budget = self.pair_budget;
-        let times = match self.level {
+        let Self { renderer, watch } = *self;
+        let mut scratch = renderer.pool().pop().unwrap_or_default();
+        let budget = renderer.pair_budget;
+        let times = match renderer.level {
             #[cfg(target_arch = "x86_64")]
             Level::Avx2(simd) => {
-                both_ways(simd, gaussians, camera, options, budget, &mut scratch, targets, loss)
+                both_ways(simd, gaussians, camera, options, budget, watch, &mut scratch, targets, loss)
             }
             Level::Portable(simd) => {
-                both_ways(simd, gaussians, camera, options, budget, &mut scratch, targets, loss)
+                both_ways(simd, gaussians, camera, options, budget, watch, &mut scratch, targets, loss)
             }
         };
-        self.pool().push(scratch);
+        renderer.pool().push(scratch);
+        watch.check()?;
         times
     }
 }
@@ -133,18 +151,24 @@ fn both_ways<S: Lanes>(
     camera: &Camera,
     options: &RenderOptions,
     pair_budget: u64,
+    watch: &Watch,
     scratch: &mut Scratch,
     (picture, of_picture, gradients): (&mut Rendered, &mut PictureGradient, &mut Gradients),
     loss: impl FnOnce(&Rendered, &mut PictureGradient) -> Result<f32>,
 ) -> Result<GradientTimes> {
-    let mut forward = super::prepare(simd, gaussians, camera, options, scratch);
-    let binned = super::blend_in_slices(simd, camera, options, pair_budget, scratch, picture, &mut forward);
+    let mut forward = super::prepare(simd, gaussians, camera, options, watch, scratch);
+    let binned =
+        super::blend_in_slices(simd, camera, options, pair_budget, watch, scratch, picture, &mut forward);
+    // The caller's function must not see a part of a picture.
+    watch.check()?;
     let start = Instant::now();
     let largest = loss(picture, of_picture)?;
     let loss = start.elapsed();
     let given = (&*of_picture, largest);
-    let backward =
-        backward::backward(simd, gaussians, camera, options, pair_budget, scratch, binned, given, gradients);
+    let budget = pair_budget;
+    let backward = backward::backward(
+        simd, gaussians, camera, options, budget, watch, scratch, binned, given, gradients,
+    );
     Ok(GradientTimes { forward, loss, backward })
 }
 
@@ -156,27 +180,7 @@ impl Differentiable for CpuRenderer {
         options: &RenderOptions,
         gradient: &PictureGradient,
     ) -> Result<Gradients> {
-        camera.validate("camera")?;
-        options.validate()?;
-        let largest = gradient.validate(camera)?;
-        if !camera.distortion.is_none() {
-            // Resampling needs the picture anyway.
-            return Ok(self.render_with_gradients(gaussians, camera, options, |_| Ok(gradient.clone()))?.1);
-        }
-        let mut scratch = self.pool().pop().unwrap_or_default();
-        let mut out = Gradients::default();
-        let budget = self.pair_budget;
-        match self.level {
-            #[cfg(target_arch = "x86_64")]
-            Level::Avx2(simd) => {
-                back(simd, gaussians, camera, options, budget, &mut scratch, (gradient, largest), &mut out);
-            }
-            Level::Portable(simd) => {
-                back(simd, gaussians, camera, options, budget, &mut scratch, (gradient, largest), &mut out);
-            }
-        }
-        self.pool().push(scratch);
-        Ok(out)
+        self.watched(&UNWATCHED).backward(gaussians, camera, options, gradient)
     }
 
     fn both_ways(
@@ -191,6 +195,58 @@ impl Differentiable for CpuRenderer {
     }
 }
 
+impl Differentiable for Watched<'_> {
+    fn backward(
+        &self,
+        gaussians: &Gaussians,
+        camera: &Camera,
+        options: &RenderOptions,
+        gradient: &PictureGradient,
+    ) -> Result<Gradients> {
+        camera.validate("camera")?;
+        options.validate()?;
+        let largest = gradient.validate(camera)?;
+        let mut out = Gradients::default();
+        if !camera.distortion.is_none() {
+            // Resampling needs the picture anyway.
+            let (mut picture, mut of_picture) = (Rendered::default(), PictureGradient::default());
+            let targets = (&mut picture, &mut of_picture, &mut out);
+            let loss = |_: &Rendered, of_picture: &mut PictureGradient| {
+                of_picture.clone_from(gradient);
+                Ok(())
+            };
+            self.both_ways_with(gaussians, camera, options, targets, loss)?;
+            return Ok(out);
+        }
+        let Self { renderer, watch } = *self;
+        let mut scratch = renderer.pool().pop().unwrap_or_default();
+        let (budget, given) = (renderer.pair_budget, (gradient, largest));
+        match renderer.level {
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2(simd) => {
+                back(simd, gaussians, camera, options, budget, watch, &mut scratch, given, &mut out);
+            }
+            Level::Portable(simd) => {
+                back(simd, gaussians, camera, options, budget, watch, &mut scratch, given, &mut out);
+            }
+        }
+        renderer.pool().push(scratch);
+        watch.check()?;
+        Ok(out)
+    }
+
+    fn both_ways(
+        &self,
+        gaussians: &Gaussians,
+        camera: &Camera,
+        options: &RenderOptions,
+        targets: (&mut Rendered, &mut PictureGradient, &mut Gradients),
+        loss: &mut dyn FnMut(&Rendered, &mut PictureGradient) -> Result<()>,
+    ) -> Result<()> {
+        self.both_ways_with(gaussians, camera, options, targets, loss).map(drop)
+    }
+}
+
 /// Without drawing the picture first.
 fn back<S: Lanes>(
     simd: S,
@@ -198,12 +254,13 @@ fn back<S: Lanes>(
     camera: &Camera,
     options: &RenderOptions,
     pair_budget: u64,
+    watch: &Watch,
     scratch: &mut Scratch,
     gradient: (&PictureGradient, f32),
     out: &mut Gradients,
 ) {
-    super::prepare(simd, gaussians, camera, options, scratch);
-    backward::backward(simd, gaussians, camera, options, pair_budget, scratch, false, gradient, out);
+    super::prepare(simd, gaussians, camera, options, watch, scratch);
+    backward::backward(simd, gaussians, camera, options, pair_budget, watch, scratch, false, gradient, out);
 }
 
 #[cfg(test)]

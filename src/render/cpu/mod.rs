@@ -14,10 +14,12 @@ mod simd;
 mod sort;
 mod splat;
 mod tile;
+mod watched;
 
 use crate::error::Result;
 use crate::gaussians::Gaussians;
 use crate::geometry::Camera;
+use crate::progress::{UNWATCHED, Watch};
 use crate::render::distorted::LensMap;
 use crate::render::view::PinholeView;
 use crate::render::{RenderOptions, Rendered, Renderer};
@@ -32,6 +34,7 @@ use splat::{PixelBounds, Splat};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tile::{Planes, TILE_HEIGHT, TILE_WIDTH, Tile};
+pub use watched::Watched;
 
 /// Gaussians projected by one task: large enough to hide its cost, small enough to keep threads evenly busy.
 const PROJECT_CHUNK: usize = 2048;
@@ -126,24 +129,7 @@ impl CpuRenderer {
         options: &RenderOptions,
         target: &mut Rendered,
     ) -> Result<StageTimes> {
-        camera.validate("camera")?;
-        options.validate()?;
-        if !camera.distortion.is_none() {
-            *target = self.lens_map(camera)?.render(self, gaussians, camera, options)?;
-            return Ok(StageTimes::default());
-        }
-        let mut scratch = self.pool().pop().unwrap_or_default();
-        let times = match self.level {
-            #[cfg(target_arch = "x86_64")]
-            Level::Avx2(simd) => {
-                draw(simd, gaussians, camera, options, self.pair_budget, &mut scratch, target)
-            }
-            Level::Portable(simd) => {
-                draw(simd, gaussians, camera, options, self.pair_budget, &mut scratch, target)
-            }
-        };
-        self.pool().push(scratch);
-        Ok(times)
+        self.watched(&UNWATCHED).render_into(gaussians, camera, options, target)
     }
 
     fn pool(&self) -> MutexGuard<'_, Vec<Scratch>> {
@@ -177,11 +163,12 @@ fn draw<S: Lanes>(
     camera: &Camera,
     options: &RenderOptions,
     pair_budget: u64,
+    watch: &Watch,
     scratch: &mut Scratch,
     target: &mut Rendered,
 ) -> StageTimes {
-    let mut times = prepare(simd, gaussians, camera, options, scratch);
-    blend_in_slices(simd, camera, options, pair_budget, scratch, target, &mut times);
+    let mut times = prepare(simd, gaussians, camera, options, watch, scratch);
+    blend_in_slices(simd, camera, options, pair_budget, watch, scratch, target, &mut times);
     times
 }
 
@@ -191,11 +178,12 @@ fn prepare<S: Lanes>(
     gaussians: &Gaussians,
     camera: &Camera,
     options: &RenderOptions,
+    watch: &Watch,
     scratch: &mut Scratch,
 ) -> StageTimes {
     let view = PinholeView::new(camera, options, gaussians.sh_degree());
     let start = Instant::now();
-    project_all(simd, &view, gaussians, scratch);
+    project_all(simd, &view, gaussians, watch, scratch);
     let projected = Instant::now();
     sort_by_depth(scratch);
     let sorted = Instant::now();
@@ -214,6 +202,7 @@ fn blend_in_slices<S: Lanes>(
     camera: &Camera,
     options: &RenderOptions,
     pair_budget: u64,
+    watch: &Watch,
     scratch: &mut Scratch,
     target: &mut Rendered,
     times: &mut StageTimes,
@@ -231,10 +220,10 @@ fn blend_in_slices<S: Lanes>(
         let last = drawn == order.len();
         bin::bin(&grid.window(), &order[slice.clone()], &bounds[slice], stripes);
         let binned = Instant::now();
-        let unfinished = blend_all(simd, grid, stripes, splats, options, target, [first, last]);
+        let unfinished = blend_all(simd, grid, stripes, splats, options, watch, target, [first, last]);
         times.bin += binned - begin;
         times.blend += binned.elapsed();
-        if last {
+        if last || watch.is_stopped() {
             return first;
         }
         if !unfinished {
@@ -244,7 +233,13 @@ fn blend_in_slices<S: Lanes>(
     }
 }
 
-fn project_all<S: Lanes>(simd: S, view: &PinholeView, gaussians: &Gaussians, scratch: &mut Scratch) {
+fn project_all<S: Lanes>(
+    simd: S,
+    view: &PinholeView,
+    gaussians: &Gaussians,
+    watch: &Watch,
+    scratch: &mut Scratch,
+) {
     let n = gaussians.len();
     let Scratch { splats, keys, pixel_bounds, .. } = scratch;
     splats.resize(n, Splat::default());
@@ -253,6 +248,10 @@ fn project_all<S: Lanes>(simd: S, view: &PinholeView, gaussians: &Gaussians, scr
     let chunks = splats.par_chunks_mut(PROJECT_CHUNK).zip(keys.par_chunks_mut(PROJECT_CHUNK));
     let chunks = chunks.zip(pixel_bounds.par_chunks_mut(PROJECT_CHUNK));
     chunks.enumerate().for_each(|(i, ((splats, keys), bounds))| {
+        if watch.is_stopped() {
+            // What an earlier picture left there may be of Gaussians that there are no more.
+            return keys.fill(project::NOT_DRAWN);
+        }
         let range = i * PROJECT_CHUNK..i * PROJECT_CHUNK + keys.len();
         simd.vectorize(
             #[inline(always)]
@@ -286,6 +285,7 @@ fn blend_all<S: Lanes>(
     stripes: &[Stripe],
     splats: &[Splat],
     options: &RenderOptions,
+    watch: &Watch,
     target: &mut Rendered,
     [first, last]: [bool; 2],
 ) -> bool {
@@ -295,6 +295,9 @@ fn blend_all<S: Lanes>(
     let bands = planes.zip(target.depth.par_chunks_mut(band)).enumerate();
     let blend_band = |tile: &mut Tile, (row, ((color, alpha), depth))| {
         let mut unfinished = false;
+        if watch.is_stopped() {
+            return unfinished;
+        }
         let mut planes = Planes { color, alpha, depth, width };
         let stripe = bin::stripe_of(stripes, row);
         for column in 0..grid.columns {

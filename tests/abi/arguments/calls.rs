@@ -1540,6 +1540,7 @@ fn options(context: usize) -> Lent {
         refine_hold_out: choice(&[0, 1]),
         refine_backend: choice_without(&[0, 1], 2),
         refine_flags: reserved(),
+        progress_overall: elsewhere(),
     });
     let mut lent = Lent::zeroed::<vg_options>("vg_options", fields);
     lent.put("context", 0, context as u64);
@@ -1583,6 +1584,8 @@ fn render_options(context: usize) -> Lent {
         far_plane: within32(0.01, 1e10),
         max_alpha: within32(0.01, 0.9999),
         flags: reserved(),
+        progress: elsewhere(),
+        progress_user: elsewhere(),
     });
     let mut lent = Lent::zeroed::<vg_render_options>("vg_render_options", fields);
     lent.put("context", 0, context as u64);
@@ -1888,6 +1891,8 @@ fn metrics_options(context: usize) -> Lent {
         lpips: elsewhere(),
         f_score_m: within64(1e-3, 1e3),
         flags: vec![(0, Fine), (1, Refused), (1 << 63, Refused)],
+        progress: elsewhere(),
+        progress_user: elsewhere(),
     });
     let mut lent = Lent::zeroed::<vg_metrics_options>("vg_metrics_options", fields);
     lent.put("context", 0, context as u64);
@@ -1988,6 +1993,8 @@ fn align_options(context: usize) -> Lent {
         context: elsewhere(),
         heading: choice(&[0, 1, 2]),
         flags: reserved(),
+        progress: elsewhere(),
+        progress_user: elsewhere(),
     });
     let mut lent = Lent::zeroed::<vg_align_options>("vg_align_options", fields);
     lent.put("context", 0, context as u64);
@@ -2112,6 +2119,8 @@ fn scene_options(context: usize) -> Lent {
         flags: reserved(),
         log: elsewhere(),
         log_user: elsewhere(),
+        progress: elsewhere(),
+        progress_user: elsewhere(),
     });
     let mut lent = Lent::zeroed::<vg_scene_options>("vg_scene_options", fields);
     lent.put("context", 0, context as u64);

@@ -29,6 +29,7 @@ from ._errors import (
     Status,
     VgError,
 )
+from ._evaluate import ViewScore, evaluate
 from ._gradients import Gradients, Planes
 from ._measures import PictureErrors, SurfaceErrors, ViewErrors
 from ._metrics import picture_errors, surface_errors, view_errors
@@ -40,12 +41,16 @@ from ._native import (
     __version__,
     pose_from_box,
     pose_from_colmap,
+    pose_from_opencv,
     pose_from_opengl,
     segment,
     similarity_from_points,
 )
 from ._reconstruct import Points, Reconstruction, reconstruct
+from ._refine import Refined, refine
+from ._report import Report
 from ._scene import Scene, open_scene
+from ._warn import VgWarning
 
 __all__ = [
     "Alignment",
@@ -68,23 +73,30 @@ __all__ = [
     "Points",
     "Reconstruction",
     "ReconstructionError",
+    "Refined",
     "Renderer",
+    "Report",
     "Scene",
     "Status",
     "SurfaceErrors",
     "VgError",
+    "VgWarning",
     "ViewErrors",
+    "ViewScore",
     "__version__",
     "align_box",
     "align_folder",
     "align_points",
     "align_scan",
+    "evaluate",
     "open_scene",
     "picture_errors",
     "pose_from_box",
     "pose_from_colmap",
+    "pose_from_opencv",
     "pose_from_opengl",
     "reconstruct",
+    "refine",
     "segment",
     "similarity_from_points",
     "surface_errors",

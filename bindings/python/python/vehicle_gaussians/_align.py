@@ -11,6 +11,7 @@ import numpy.typing as npt
 from . import _native
 from ._alignment import Alignment
 from ._arguments import listed
+from ._progress import Progress
 from ._types import Floats, Heading
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ def align_scan(
     heading: Heading = "auto",
     names: Sequence[str] | None = None,
     threads: int = 0,
+    progress: Progress | None = None,
 ) -> Alignment:
     """The vehicle's frame by points scanned on the vehicle: their outline must run along the edges of all masks.
 
@@ -35,13 +37,14 @@ def align_scan(
     first view by name, of those not taken from abeam, was taken from ahead of the vehicle's middle; "backward": from
     behind.
     names: of the views, for messages; "000", "001", ... if not given. threads: worker threads; 0 means one per core.
+    progress: as for ``reconstruct``, with the one stage "align".
 
     >>> alignment = align_scan(masks, cameras_in_world, scan)  # doctest: +SKIP
     >>> scene = open_scene("my-car", vehicle_from_world=alignment.vehicle_from_world)  # doctest: +SKIP
     """
     views = listed(masks, "masks", 2), listed(cameras, "cameras")
     names = None if names is None else listed(names, "names")
-    return Alignment(*_native.align_scan(*views, scan, sparse, heading, names, threads))
+    return Alignment(*_native.align_scan(*views, scan, sparse, heading, names, threads, progress))
 
 
 def align_box(
@@ -53,6 +56,7 @@ def align_box(
     heading: Literal["forward", "backward"],
     names: Sequence[str] | None = None,
     threads: int = 0,
+    progress: Progress | None = None,
 ) -> Alignment:
     """The vehicle's frame by its size and the ground; its origin is the box's middle.
 
@@ -64,7 +68,7 @@ def align_box(
     """
     views = listed(masks, "masks", 2), listed(cameras, "cameras")
     names = None if names is None else listed(names, "names")
-    return Alignment(*_native.align_box(*views, sparse, size, heading, names, threads))
+    return Alignment(*_native.align_box(*views, sparse, size, heading, names, threads, progress))
 
 
 def align_points(world: npt.ArrayLike, vehicle: npt.ArrayLike) -> Alignment:
@@ -86,6 +90,7 @@ def align_folder(
     *,
     heading: Heading = "auto",
     threads: int = 0,
+    progress: Progress | None = None,
 ) -> Alignment:
     """``align_scan`` with the files of a scene: a COLMAP folder, one of 3DRealCar, or a ``transforms.json``.
 
@@ -93,4 +98,4 @@ def align_folder(
 
     >>> alignment = align_folder("3drealcar/2024_06_04_13_44_39")  # doctest: +SKIP
     """
-    return Alignment(*_native.align_folder(path, scan, heading, threads))
+    return Alignment(*_native.align_folder(path, scan, heading, threads, progress))

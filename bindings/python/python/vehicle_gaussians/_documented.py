@@ -12,11 +12,16 @@ T = TypeVar("T")
 
 def documented(cls: type[T]) -> type[T]:
     """Gives the fields of a named tuple the strings that follow them in the source."""
-    if cls.__module__ not in _TEXTS:
-        _TEXTS[cls.__module__] = _texts(cls.__module__)
-    for field, text in _TEXTS[cls.__module__].get(cls.__name__, {}).items():
+    for field, text in field_texts(cls).items():
         getattr(cls, field).__doc__ = text
     return cls
+
+
+def field_texts(cls: type) -> dict[str, str]:
+    """The strings that follow the fields of a class in the source."""
+    if cls.__module__ not in _TEXTS:
+        _TEXTS[cls.__module__] = _texts(cls.__module__)
+    return _TEXTS[cls.__module__].get(cls.__name__, {})
 
 
 #: Strings after fields, by module, class and field.

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from . import _native
 from ._measures import PictureErrors, SurfaceErrors, ViewErrors
+from ._pictures import in_range
 from ._types import Floats
 
 if TYPE_CHECKING:
@@ -16,17 +17,24 @@ if TYPE_CHECKING:
 
 
 def picture_errors(
-    a: npt.NDArray[Any], b: npt.NDArray[Any], *, lpips: Model | None = None, threads: int = 0
+    a: npt.NDArray[Any],
+    b: npt.NDArray[Any],
+    *,
+    data_range: float | None = None,
+    lpips: Model | None = None,
+    threads: int = 0,
 ) -> PictureErrors:
     """The difference of two pictures of one size, uint8 or floats in [0, 1], (height, width, 3 or 4).
 
-    What their alpha leaves open is white. lpips: the network that measures LPIPS, made by
-    ``python -m vehicle_gaussians.export.lpips``. threads: worker threads; 0 means one per core.
+    What their alpha leaves open is white. data_range: what white is in both, where it is not 255 in bytes and 1 in
+    floats; floats that are more than 1 beyond their range are an error, since clamped they would be equal.
+    lpips: the network that measures LPIPS, made by ``python -m vehicle_gaussians.export.lpips``.
+    threads: worker threads; 0 means one per core.
 
     >>> picture_errors(image, image).psnr_db
     inf
     """
-    return PictureErrors(*_native.picture_errors(a, b, lpips, threads))
+    return PictureErrors(*_native.picture_errors(in_range(a, data_range), in_range(b, data_range), lpips, threads))
 
 
 def view_errors(

@@ -1,12 +1,13 @@
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Literal, SupportsIndex, final, overload
+from typing import Any, Literal, SupportsIndex, final, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from ._gradients import Gradients, Planes
+from ._progress import Progress
 from ._types import Backend, Background, DepthMode, Floats, Heading, Size
 
 __all__ = [
@@ -26,8 +27,10 @@ __all__ = [
     "picture_errors",
     "pose_from_box",
     "pose_from_colmap",
+    "pose_from_opencv",
     "pose_from_opengl",
     "reconstruct",
+    "refine",
     "segment",
     "similarity_from_points",
     "surface_errors",
@@ -78,21 +81,65 @@ class Camera:
     @staticmethod
     def from_opencv(
         K: npt.ArrayLike,
-        vehicle_from_camera: npt.ArrayLike,
-        width: SupportsIndex,
-        height: SupportsIndex,
+        vehicle_from_camera: npt.ArrayLike | None = None,
+        width: SupportsIndex = 0,
+        height: SupportsIndex = 0,
         distortion: npt.ArrayLike | None = None,
         *,
         fisheye: bool = False,
+        rvec: npt.ArrayLike | None = None,
+        tvec: npt.ArrayLike | None = None,
+        vehicle_from_world: npt.ArrayLike | None = None,
     ) -> Camera:
         """From OpenCV's calibration, which puts the centre of the top-left pixel at (0, 0): half a pixel is added to the
         principal point.
 
-        distortion is that of cv2.calibrateCamera or, with fisheye=True, of cv2.fisheye.
+        distortion is that of cv2.calibrateCamera or, with fisheye=True, of cv2.fisheye. Instead of the pose, rvec and tvec
+        as cv2.solvePnP and cv2.calibrateCamera return them, from the world of the object's points; without
+        vehicle_from_world, a 4x4 similarity, that world is the vehicle's frame.
 
-            >>> camera = Camera.from_opencv([[600, 0, 319.5], [0, 600, 239.5], [0, 0, 1]], vehicle_from_camera, 640, 480)
+            >>> K = [[600, 0, 319.5], [0, 600, 239.5], [0, 0, 1]]
+            >>> camera = Camera.from_opencv(K, vehicle_from_camera, 640, 480)
             >>> float(camera.K[0, 2])
             320.0
+            >>> rvec, tvec = [0.0, 0.0, 1.5], [0.0, 0.5, 6.0]
+            >>> camera = Camera.from_opencv(K, width=640, height=480, distortion=[-0.1, 0, 0, 0], rvec=rvec, tvec=tvec)
+        """
+    @staticmethod
+    def look_at(
+        eye: npt.ArrayLike,
+        target: npt.ArrayLike,
+        width: SupportsIndex,
+        height: SupportsIndex,
+        *,
+        fov_y_degrees: float = 35.0,
+        up: npt.ArrayLike = (0.0, 0.0, 1.0),
+    ) -> Camera:
+        """A pinhole camera at eye, a point of the vehicle's frame in metres, whose optical axis meets target. Its picture
+        shows fov_y_degrees from top to bottom, and up is up in it. For another lens: with_pose.
+
+            >>> camera = Camera.look_at((6, -4, 1.5), (0, 0, 0.7), 640, 480)
+            >>> camera.project([[0, 0, 0.7]]).round(6)
+            array([[320., 240.]])
+        """
+    @overload
+    def project(self, points: npt.ArrayLike, depth: Literal[False] = False) -> npt.NDArray[np.float64]:
+        """The pixels (n, 2), column and row, of points (n, 3) of the vehicle's frame, metres; with depth=True a pair of them
+        and the depths (n,) along the optical axis, metres. NaN where the camera has no picture of a point: behind it, and
+        beyond the angle at which its lens folds back. The centre of the top-left pixel is (0.5, 0.5); pixels outside 0 to
+        width and 0 to height lie beside the picture.
+
+            >>> pixels, depths = camera.project(car.means, depth=True)
+        """
+    @overload
+    def project(
+        self, points: npt.ArrayLike, depth: Literal[True]
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
+    def unproject(self, pixels: npt.ArrayLike, depths: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """The points (n, 3) of the vehicle's frame, metres, behind pixels (n, 2), column and row, at depths (n,) along the
+        optical axis, metres. NaN where a depth is no measurement (0, negative, NaN), and where the lens has no ray.
+
+            >>> point = camera.unproject([[320.0, 240.0]], [6.0])
         """
     def scaled(self, width: SupportsIndex, height: SupportsIndex) -> Camera:
         """The same camera for pictures resized to width x height.
@@ -175,9 +222,10 @@ class Renderer:
         near: float = 0.01,
         far: float = 1e10,
         sh_degree: int = 3,
+        progress: Progress | None = None,
     ) -> list[npt.NDArray[np.uint8]]:
         """The pictures of several cameras, a list of what render gives. A graphics processor draws one while the picture
-        before it is copied.
+        before it is copied. progress is as for reconstruct, with the one stage "render".
 
             >>> pictures = Renderer(car).render_many(cameras)
         """
@@ -213,6 +261,45 @@ class Gaussians:
         one is complete.
 
             >>> car.save_ply("copy.ply")
+        """
+    @staticmethod
+    def from_ply_bytes(data: bytes | bytearray | memoryview) -> Gaussians:
+        """From the bytes of a PLY file in the layout of 3D Gaussian Splatting.
+
+        >>> same = Gaussians.from_ply_bytes(car.to_ply_bytes())
+        """
+    def to_ply_bytes(self) -> bytes:
+        """What save_ply writes, as bytes.
+
+        >>> car.to_ply_bytes()[:4]
+        b'ply\n'
+        """
+    def __getitem__(
+        self, index: slice | Sequence[int] | Sequence[bool] | npt.NDArray[np.integer[Any] | np.bool_], /
+    ) -> Gaussians: ...
+    def cropped(self, low: npt.ArrayLike, high: npt.ArrayLike) -> Gaussians:
+        """Those whose centre lies in the box from low to high, three numbers each, metres, its faces included. Infinite sides
+        are open.
+
+            >>> front = car.cropped((0, -10, -10), (10, 10, 10))
+        """
+    def covariances(self) -> npt.NDArray[np.float32]:
+        """Covariance matrices in the vehicle's frame, square metres. (n, 3, 3)
+
+        >>> volumes = np.sqrt(np.linalg.det(car.covariances()))
+        """
+    def turntable(
+        self,
+        count: SupportsIndex,
+        width: SupportsIndex,
+        height: SupportsIndex,
+        *,
+        elevation_degrees: float = 12.0,
+        fov_y_degrees: float = 35.0,
+    ) -> list[Camera]:
+        """count cameras on a circle around the vehicle, from its front towards its left, each with all of it in its picture.
+
+        >>> pictures = Renderer(car).render_many(car.turntable(36, 320, 240))
         """
     def mirrored(self) -> Gaussians:
         """The mirror image across the plane of symmetry, y = 0.
@@ -468,7 +555,15 @@ def pose_from_colmap(
 
         >>> vehicle_from_camera = pose_from_colmap([1, 0, 0, 0], [0, 0, 5], vehicle_from_world)
     """
+def pose_from_opencv(
+    rvec: npt.ArrayLike, tvec: npt.ArrayLike, vehicle_from_world: npt.ArrayLike | None = None
+) -> npt.NDArray[np.float64]:
+    """vehicle_from_camera (4x4) of OpenCV's world-to-camera rotation vector and translation, as cv2.solvePnP returns them.
 
+    vehicle_from_world is the similarity (4x4) from that world to the vehicle's frame; without, they are one.
+
+        >>> vehicle_from_camera = pose_from_opencv([0.0, 0.0, 1.5], [0.0, 0.5, 6.0])
+    """
 def pose_from_opengl(
     camera_to_world: npt.ArrayLike,
     vehicle_from_world: npt.ArrayLike | None = None,
@@ -504,6 +599,7 @@ def align_scan(
     heading: Heading,
     names: Sequence[str] | None,
     threads: int,
+    progress: Progress | None,
 ) -> tuple[npt.NDArray[np.float64], float, float, float, float | None, float | None, int]: ...
 def align_box(
     masks: Sequence[npt.NDArray[np.generic] | None],
@@ -513,6 +609,7 @@ def align_box(
     heading: Heading,
     names: Sequence[str] | None,
     threads: int,
+    progress: Progress | None,
 ) -> tuple[npt.NDArray[np.float64], float, float, float, float | None, float | None, int]: ...
 def align_points(
     world: npt.ArrayLike, vehicle: npt.ArrayLike
@@ -528,7 +625,11 @@ def align_points(
     npt.NDArray[np.float64],
 ]: ...
 def align_folder(
-    path: str | PathLike[str], scan: str | PathLike[str] | None, heading: Heading, threads: int
+    path: str | PathLike[str],
+    scan: str | PathLike[str] | None,
+    heading: Heading,
+    threads: int,
+    progress: Progress | None,
 ) -> tuple[npt.NDArray[np.float64], float, float, float, float | None, float | None, int]: ...
 def picture_errors(
     a: npt.NDArray[np.generic],
@@ -594,14 +695,30 @@ def reconstruct(
     refine_backend: str,
     threads: int,
     names: Sequence[str] | None,
-    progress: Callable[[str, float], object] | None,
+    progress: Progress | None,
 ) -> tuple[Gaussians, str, tuple[npt.NDArray[np.float32], npt.NDArray[np.uint8]] | None]: ...
+def refine(
+    gaussians: Gaussians,
+    images: Sequence[npt.NDArray[np.uint8]],
+    masks: Sequence[npt.NDArray[np.generic] | None],
+    cameras: Sequence[Camera],
+    depths: Sequence[Floats | None],
+    names: Sequence[str],
+    iterations: int | None,
+    seconds: float | None,
+    hold_out: bool,
+    densify: bool,
+    backend: Backend,
+    threads: int,
+    progress: Progress | None,
+) -> tuple[Gaussians, str]: ...
 def open_scene(
     path: str | PathLike[str],
     views: Sequence[str] | None,
     vehicle_from_world: npt.ArrayLike | str | PathLike[str] | None,
     depth_scale: float | None,
     load_depth: bool,
+    progress: Progress | None,
 ) -> tuple[
     list[npt.NDArray[np.uint8]],
     list[npt.NDArray[np.bool_] | None],

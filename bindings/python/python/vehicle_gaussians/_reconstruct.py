@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -15,7 +15,9 @@ from ._arguments import listed
 from ._documented import documented
 from ._equal import equal_by_value
 from ._native import Camera, Gaussians, Model
+from ._progress import Progress
 from ._types import Backend, Calibrate, Floats, Keep, Mask, Prior, Relight, Size, Symmetry
+from ._warn import reconstructed
 
 
 @equal_by_value
@@ -70,7 +72,7 @@ def reconstruct(
     refine_backend: Backend = "auto",
     threads: int = 0,
     names: Iterable[str] | None = None,
-    progress: Callable[[str, float], object] | None = None,
+    progress: Progress | None = None,
 ) -> Reconstruction:
     """Reconstructs the vehicle that the photographs show.
 
@@ -80,7 +82,8 @@ def reconstruct(
     symmetry).
     depths: floats (height, width), metres along the optical axis, 0 for none.
     prior: "given" takes the depths, "hull" the silhouettes, "shape" the silhouettes and what vehicles look like,
-    "onnx" the network prior_model; "auto" the depths if every used view has them, else "shape".
+    "onnx" the network prior_model; "auto" the depths if every used view has them, else "shape",
+    which bends to those that are there, with a warning.
     prior_model, head_model: networks that tell depth, and that make Gaussians of pixels.
     calibrate: correct cameras and the plane of symmetry where the silhouettes contradict them ("auto"), or take them
     as they are ("off").
@@ -106,8 +109,9 @@ def reconstruct(
     refine_backend: who draws and goes back in it; "auto" is what is known to pay, at present the processor.
     threads: worker threads; 0 means one per core. The result is the same with any number.
     names: of the views, for messages and the report.
-    progress: called as progress(stage, fraction) on this thread; a true return value cancels (a VgError with code
-    CANCELLED), an exception passes through. Ctrl-C raises KeyboardInterrupt at the next call.
+    progress: called on this thread as progress(stage, fraction), or progress(stage, fraction, overall) if it has three
+    parameters without a default: the part of the whole call that is done, in expected time, which ends at 1. False
+    cancels, and False alone: a CancelledError. An exception passes through. Ctrl-C raises KeyboardInterrupt.
 
     >>> scene = open_scene("my-car")
     >>> made = reconstruct(scene.images, scene.masks, scene.cameras, scene.depths, names=scene.names)
@@ -144,4 +148,6 @@ def reconstruct(
         names=None if names is None else listed(names, "names"),
         progress=progress,
     )
-    return Reconstruction(gaussians, json.loads(report), None if lifted is None else Points(*lifted))
+    told = json.loads(report)
+    reconstructed(told)
+    return Reconstruction(gaussians, told, None if lifted is None else Points(*lifted))

@@ -13,6 +13,7 @@ from . import _native
 from ._arguments import listed
 from ._equal import equal_by_value
 from ._native import Camera
+from ._progress import Progress
 
 
 @equal_by_value
@@ -39,6 +40,7 @@ def open_scene(
     *,
     depth_scale: float | None = None,
     load_depth: bool = True,
+    progress: Progress | None = None,
 ) -> Scene:
     """Opens a scene: a ``transforms.json`` in nerfstudio's format, a folder with one, or a COLMAP folder.
 
@@ -46,6 +48,7 @@ def open_scene(
     vehicle_from_world: the similarity from the scene's world to the vehicle's frame, as a 4x4 matrix or the JSON file
     that holds one. A COLMAP model needs it; a transforms.json is taken to be in the vehicle's frame without.
     depth_scale: metres per number in the depth files, instead of what the scene says.
+    progress: as for ``reconstruct``, with the one stage "read".
 
     What is legal but looks like a mistake is a warning.
 
@@ -55,4 +58,4 @@ def open_scene(
     """
     if views is not None:
         views = [views] if isinstance(views, str) else listed(views, "views")
-    return Scene(*_native.open_scene(path, views, vehicle_from_world, depth_scale, load_depth))
+    return Scene(*_native.open_scene(path, views, vehicle_from_world, depth_scale, load_depth, progress))

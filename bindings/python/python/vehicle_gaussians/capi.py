@@ -24,12 +24,11 @@ import re
 import signal
 import sys
 import threading
-import warnings
 import weakref
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import FrameType
-from typing import Any, Literal, NamedTuple, NoReturn, Protocol, TypeAlias
+from typing import Any, Literal, NamedTuple, NoReturn, Protocol, TypeAlias, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -37,11 +36,17 @@ import numpy.typing as npt
 from . import _types
 from ._alignment import Alignment
 from ._arguments import bad_type, bad_value, doubles, floats, listed, pose, real, whole
+from ._documented import documented
 from ._equal import equal_by_value
 from ._errors import ArgumentTypeError, Status, VgError
+from ._evaluate import ViewScore, rows
 from ._frozen import FrozenArray
 from ._gradients import Gradients, Planes
 from ._measures import PictureErrors, SurfaceErrors, ViewErrors
+from ._pictures import in_range
+from ._progress import Progress, teller
+from ._select import indices
+from ._warn import reconstructed, warn
 
 #: The binary interface that this module is written for.
 ABI_VERSION = 0
@@ -143,6 +148,12 @@ class DepthMode(enum.IntEnum):
     EXPECTED, ACCUMULATED = range(2)
 
 
+class RefineStop(enum.IntEnum):
+    """vg_refine_stop"""
+
+    DONE, HELD_OUT, DIVERGED, UNSEEN = range(4)
+
+
 #: vg_progress_fn
 ProgressFn = ct.CFUNCTYPE(ct.c_int32, ct.c_char_p, ct.c_double, ct.c_void_p)
 #: vg_loss_fn
@@ -237,6 +248,7 @@ class vg_options(ct.Structure):
         ("refine_hold_out", ct.c_int32),
         ("refine_backend", ct.c_int32),
         ("refine_flags", ct.c_uint32),
+        ("progress_overall", ct.POINTER(ct.c_double)),
     )
 
 
@@ -302,6 +314,8 @@ class vg_render_options(ct.Structure):
         ("far_plane", ct.c_float),
         ("max_alpha", ct.c_float),
         ("flags", ct.c_uint32),
+        ("progress", ProgressFn),
+        ("progress_user", ct.c_void_p),
     )
 
 
@@ -364,6 +378,35 @@ class vg_gradients(ct.Structure):
     )
 
 
+class vg_refine_options(ct.Structure):
+    _fields_ = (
+        ("struct_size", ct.c_size_t),
+        ("context", ct.c_void_p),
+        ("seconds", ct.c_double),
+        ("iterations", ct.c_uint32),
+        ("hold_out", ct.c_int32),
+        ("densify", ct.c_int32),
+        ("backend", ct.c_int32),
+        ("progress", ProgressFn),
+        ("progress_user", ct.c_void_p),
+        ("flags", ct.c_uint64),
+    )
+
+
+class vg_refinement(ct.Structure):
+    _fields_ = (
+        ("struct_size", ct.c_size_t),
+        ("iterations", ct.c_uint32),
+        ("made", ct.c_uint32),
+        ("kept", ct.c_uint32),
+        ("stop", ct.c_int32),
+        ("psnr_before_db", ct.c_double),
+        ("psnr_after_db", ct.c_double),
+        ("held_out_before_db", ct.c_double),
+        ("held_out_after_db", ct.c_double),
+    )
+
+
 class vg_segment_options(ct.Structure):
     _fields_ = (("struct_size", ct.c_size_t), ("context", ct.c_void_p), ("flags", ct.c_uint64))
 
@@ -375,6 +418,8 @@ class vg_metrics_options(ct.Structure):
         ("lpips", ct.c_void_p),
         ("f_score_m", ct.c_double),
         ("flags", ct.c_uint64),
+        ("progress", ProgressFn),
+        ("progress_user", ct.c_void_p),
     )
 
 
@@ -396,6 +441,8 @@ class vg_align_options(ct.Structure):
         ("context", ct.c_void_p),
         ("heading", ct.c_int32),
         ("flags", ct.c_uint32),
+        ("progress", ProgressFn),
+        ("progress_user", ct.c_void_p),
     )
 
 
@@ -424,6 +471,8 @@ class vg_scene_options(ct.Structure):
         ("flags", ct.c_uint32),
         ("log", LogFn),
         ("log_user", ct.c_void_p),
+        ("progress", ProgressFn),
+        ("progress_user", ct.c_void_p),
     )
 
 
@@ -432,6 +481,7 @@ _out: Any = ct.POINTER(ct.c_void_p)
 _numbers: Any = ct.c_void_p
 _size: Any = ct.c_size_t
 _text: Any = ct.c_char_p
+_f64: Any = ct.c_double
 _u32: Any = ct.c_uint32
 _i32: Any = ct.c_int32
 
@@ -444,6 +494,7 @@ def _pointer(structure: type[ct.Structure]) -> Any:
 PROTOTYPES: Mapping[str, tuple[Any, tuple[Any, ...]]] = {
     "vg_version": (_text, ()),
     "vg_abi_version": (_u32, ()),
+    "vg_status_name": (_text, (_i32,)),
     "vg_error_code": (_i32, (_handle,)),
     "vg_error_message": (_text, (_handle,)),
     "vg_error_free": (None, (_handle,)),
@@ -460,9 +511,16 @@ PROTOTYPES: Mapping[str, tuple[Any, tuple[Any, ...]]] = {
     "vg_camera_scale": (_i32, (_pointer(vg_camera), _u32, _u32, _pointer(vg_camera), _out)),
     "vg_camera_crop": (_i32, (_pointer(vg_camera), _u32, _u32, _u32, _u32, _pointer(vg_camera), _out)),
     "vg_pose_from_colmap": (_i32, (_numbers, _numbers, _numbers, _numbers, _out)),
+    "vg_pose_from_opencv": (_i32, (_numbers, _numbers, _numbers, _numbers, _out)),
+    "vg_pose_look_at": (_i32, (_numbers, _numbers, _numbers, _numbers, _out)),
     "vg_pose_from_opengl": (_i32, (_numbers, _numbers, _numbers, _out)),
     "vg_pose_from_box": (_i32, (_numbers, _numbers, _numbers, _out)),
     "vg_camera_project": (_i32, (_pointer(vg_camera), _numbers, _numbers, _out)),
+    "vg_camera_look_at": (_i32, (_numbers, _numbers, _numbers, _f64, _u32, _u32, _pointer(vg_camera), _out)),
+    "vg_cameras_turntable": (_i32, (_handle, _size, _f64, _f64, _u32, _u32, _pointer(vg_camera), _out)),
+    "vg_camera_project_points": (_i32, (_pointer(vg_camera), _numbers, _size, _numbers, _numbers, _out)),
+    "vg_camera_unproject": (_i32, (_pointer(vg_camera), _numbers, _f64, _numbers, _out)),
+    "vg_camera_unproject_points": (_i32, (_pointer(vg_camera), _numbers, _numbers, _size, _numbers, _out)),
     "vg_view_init": (_i32, (_pointer(vg_view), _size)),
     "vg_model_options_init": (_i32, (_pointer(vg_model_options), _size)),
     "vg_model_open": (_i32, (_text, _pointer(vg_model_options), _out, _out)),
@@ -489,8 +547,29 @@ PROTOTYPES: Mapping[str, tuple[Any, tuple[Any, ...]]] = {
     "vg_gaussians_transform": (_i32, (_handle, _numbers, _out, _out)),
     "vg_gaussians_mirror": (_i32, (_handle, _out, _out)),
     "vg_gaussians_merge": (_i32, (_handle, _handle, _out, _out)),
+    "vg_gaussians_select": (_i32, (_handle, _numbers, _size, _out, _out)),
+    "vg_gaussians_mask": (_i32, (_handle, _numbers, _size, _out, _out)),
+    "vg_gaussians_crop": (_i32, (_handle, _numbers, _numbers, _out, _out)),
+    "vg_gaussians_covariances": (_i32, (_handle, _numbers, _size, _out)),
+    "vg_gaussians_load_ply_memory": (_i32, (_numbers, _size, _out, _out)),
+    "vg_gaussians_ply_size": (_size, (_handle,)),
+    "vg_gaussians_save_ply_memory": (_i32, (_handle, _numbers, _size, _out)),
     "vg_gaussians_free": (None, (_handle,)),
     "vg_reconstruct": (_i32, (_pointer(vg_view), _size, _pointer(vg_options), _out, _out, _out)),
+    "vg_refine_options_init": (_i32, (_pointer(vg_refine_options), _size)),
+    "vg_refinement_init": (_i32, (_pointer(vg_refinement), _size)),
+    "vg_refine": (
+        _i32,
+        (
+            _handle,
+            _pointer(vg_view),
+            _size,
+            _pointer(vg_refine_options),
+            _out,
+            _pointer(vg_refinement),
+            _out,
+        ),
+    ),
     "vg_render_options_init": (_i32, (_pointer(vg_render_options), _size)),
     "vg_image_target_init": (_i32, (_pointer(vg_image_target), _size)),
     "vg_render": (
@@ -796,15 +875,24 @@ def camera_from_colmap(
 
 def camera_from_opencv(
     K: npt.ArrayLike,
-    vehicle_from_camera: npt.ArrayLike,
-    width: int,
-    height: int,
+    vehicle_from_camera: npt.ArrayLike | None = None,
+    width: int = 0,
+    height: int = 0,
     distortion: npt.ArrayLike = (),
     *,
     fisheye: bool = False,
+    rvec: npt.ArrayLike | None = None,
+    tvec: npt.ArrayLike | None = None,
+    vehicle_from_world: npt.ArrayLike | None = None,
 ) -> vg_camera:
-    """A camera of OpenCV's calibration, which puts the centre of the top-left pixel at (0, 0)."""
+    """A camera of OpenCV's calibration, which puts the centre of the top-left pixel at (0, 0); the arguments are those
+    of vehicle_gaussians.Camera.from_opencv."""
     k, bent = doubles(K, "K", (3, 3)), doubles(distortion, "distortion")
+    if vehicle_from_camera is None and rvec is not None and tvec is not None:
+        vehicle_from_camera = pose_from_opencv(rvec, tvec, vehicle_from_world)
+    elif vehicle_from_camera is None or any(given is not None for given in (rvec, tvec, vehicle_from_world)):
+        found = "no whole pose" if vehicle_from_camera is None else "more than one pose"
+        raise bad_value("vehicle_from_camera, rvec, tvec", found, "vehicle_from_camera, or rvec and tvec")
     rows, made = pose(vehicle_from_camera, "vehicle_from_camera"), vg_camera()
     size = _side(width, "width"), _side(height, "height")
     _call(
@@ -812,6 +900,56 @@ def camera_from_opencv(
         *(k.ctypes.data, bent.ctypes.data, bent.size, fisheye, *size, rows.ctypes.data, ct.byref(made)),
     )
     return made
+
+
+def camera_look_at(
+    eye: npt.ArrayLike,
+    target: npt.ArrayLike,
+    width: int,
+    height: int,
+    *,
+    fov_y_degrees: float = 35.0,
+    up: npt.ArrayLike = (0.0, 0.0, 1.0),
+) -> vg_camera:
+    """A pinhole camera placed by hand; the arguments are those of vehicle_gaussians.Camera.look_at."""
+    points = [doubles(point, name, (3,)) for point, name in ((eye, "eye"), (target, "target"), (up, "up"))]
+    size, made = (_side(width, "width"), _side(height, "height")), vg_camera()
+    addresses = [point.ctypes.data for point in points]
+    _call("vg_camera_look_at", *addresses, real(fov_y_degrees, "fov_y_degrees"), *size, ct.byref(made))
+    return made
+
+
+@overload
+def project(camera: Camera, points: npt.ArrayLike, depth: Literal[False] = False) -> npt.NDArray[np.float64]: ...
+@overload
+def project(
+    camera: Camera, points: npt.ArrayLike, depth: Literal[True]
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
+def project(camera: Camera, points: npt.ArrayLike, depth: bool = False) -> Any:
+    """Pixels of points, and their depths; the arguments are those of vehicle_gaussians.Camera.project."""
+    posed, places = _camera(camera), _rows(points, "points", 3)
+    pixels, depths = np.empty((len(places), 2)), np.empty(len(places))
+    numbers = (places.ctypes.data, len(places), pixels.ctypes.data, depths.ctypes.data)
+    _call("vg_camera_project_points", ct.byref(posed), *numbers)
+    return (pixels, depths) if depth else pixels
+
+
+def unproject(camera: Camera, pixels: npt.ArrayLike, depths: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Points behind pixels; the arguments are those of vehicle_gaussians.Camera.unproject."""
+    posed, places, along = _camera(camera), _rows(pixels, "pixels", 2), doubles(depths, "depths")
+    if along.shape != (len(places),):
+        raise bad_value("depths", f"shape {along.shape}", f"({len(places)},), one for each pixel")
+    points = np.empty((len(places), 3))
+    numbers = (places.ctypes.data, along.ctypes.data, len(places), points.ctypes.data)
+    _call("vg_camera_unproject_points", ct.byref(posed), *numbers)
+    return points
+
+
+def _rows(numbers: npt.ArrayLike, argument: str, columns: int) -> npt.NDArray[np.float64]:
+    array = doubles(numbers, argument)
+    if array.ndim != 2 or array.shape[1] != columns:
+        raise bad_value(argument, f"shape {array.shape}", f"an (n, {columns}) array")
+    return array
 
 
 def _side(number: int, argument: str) -> int:
@@ -826,6 +964,22 @@ def pose_from_colmap(
     q, t, world = doubles(qvec, "qvec", (4,)), doubles(tvec, "tvec", (3,)), _similarity(vehicle_from_world)
     made = np.eye(4)
     _call("vg_pose_from_colmap", q.ctypes.data, t.ctypes.data, _address(world), made.ctypes.data)
+    return made
+
+
+def pose_from_opencv(
+    rvec: npt.ArrayLike, tvec: npt.ArrayLike, vehicle_from_world: npt.ArrayLike | None = None
+) -> npt.NDArray[np.float64]:
+    """vehicle_from_camera (4x4) of OpenCV's world-to-camera rotation vector and translation."""
+    vectors = []
+    for vector, name in ((rvec, "rvec"), (tvec, "tvec")):
+        array = doubles(vector, name)
+        # OpenCV hands out (3, 1).
+        if array.size != 3:
+            raise bad_value(name, f"shape {array.shape}", "3 numbers")
+        vectors.append(array)
+    world, made = _similarity(vehicle_from_world), np.eye(4)
+    _call("vg_pose_from_opencv", *(v.ctypes.data for v in vectors), _address(world), made.ctypes.data)
     return made
 
 
@@ -926,6 +1080,58 @@ class Gaussians:
         """Writes a PLY file in the layout of 3D Gaussian Splatting."""
         _call("vg_gaussians_save_ply", self._handle, os.fsencode(path))
 
+    @classmethod
+    def from_ply_bytes(cls, data: bytes | bytearray | memoryview) -> Gaussians:
+        """From the bytes of a PLY file in the layout of 3D Gaussian Splatting."""
+        try:
+            held = np.frombuffer(data, np.uint8)
+        except (TypeError, ValueError):
+            raise bad_type("data", data, "bytes") from None
+        return cls._made_by("vg_gaussians_load_ply_memory", held.ctypes.data, held.size)
+
+    def to_ply_bytes(self) -> bytes:
+        """What save_ply writes, as bytes."""
+        data = np.empty(library.vg_gaussians_ply_size(self._handle), np.uint8)
+        _call("vg_gaussians_save_ply_memory", self._handle, data.ctypes.data, data.size)
+        return data.tobytes()
+
+    def __getitem__(
+        self, index: slice | Sequence[int] | Sequence[bool] | npt.NDArray[np.integer[Any] | np.bool_]
+    ) -> Gaussians:
+        """Those that an index of NumPy's selects: a slice, bools, or whole numbers."""
+        chosen = indices(index, len(self)).astype(np.uintp)
+        return self._made_by("vg_gaussians_select", self._handle, chosen.ctypes.data, len(chosen))
+
+    #: No sequence: each of them is Gaussians again.
+    __iter__ = None
+
+    def cropped(self, low: npt.ArrayLike, high: npt.ArrayLike) -> Gaussians:
+        """Those whose centre lies in the box from low to high, metres, its faces included."""
+        corners = doubles(low, "low", (3,)), doubles(high, "high", (3,))
+        return self._made_by("vg_gaussians_crop", self._handle, *(corner.ctypes.data for corner in corners))
+
+    def covariances(self) -> npt.NDArray[np.float32]:
+        """Covariance matrices in the vehicle's frame, square metres. (n, 3, 3)"""
+        upper = np.empty((len(self), 6), np.float32)
+        _call("vg_gaussians_covariances", self._handle, upper.ctypes.data, len(self))
+        return upper[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
+
+    def turntable(
+        self,
+        count: int,
+        width: int,
+        height: int,
+        *,
+        elevation_degrees: float = 12.0,
+        fov_y_degrees: float = 35.0,
+    ) -> list[vg_camera]:
+        """Cameras on a circle around the vehicle; the arguments are those of vehicle_gaussians.Gaussians.turntable."""
+        cameras = (vg_camera * whole(count, "count", 1, 100_000))()
+        angles = real(elevation_degrees, "elevation_degrees"), real(fov_y_degrees, "fov_y_degrees")
+        size = _side(width, "width"), _side(height, "height")
+        _call("vg_cameras_turntable", self._handle, count, *angles, *size, cameras)
+        return [vg_camera.from_buffer_copy(camera) for camera in cameras]
+
     def mirrored(self) -> Gaussians:
         """The mirror image across the plane of symmetry, y = 0."""
         return self._made_by("vg_gaussians_mirror", self._handle)
@@ -988,7 +1194,8 @@ class Gaussians:
         depth = np.empty(size, np.float32) if with_depth else None
         target.width, target.height = posed.width, posed.height
         target.color, target.depth = picture.ctypes.data, _address(depth)
-        _call("vg_render", self._handle, ct.byref(posed), ct.byref(options), ct.byref(target))
+        with _told(options, None):
+            _call("vg_render", self._handle, ct.byref(posed), ct.byref(options), ct.byref(target))
         return (picture[..., :3] if opaque else picture), depth
 
     def render_planes(
@@ -1010,7 +1217,8 @@ class Gaussians:
         picture, alpha, depth = np.empty((*size, 4), np.float32), np.empty(size, np.float32), np.empty(size, np.float32)
         target.width, target.height, target.color_format = posed.width, posed.height, Format.RGBA32F
         target.color, target.alpha, target.depth = picture.ctypes.data, alpha.ctypes.data, depth.ctypes.data
-        _call("vg_render", self._handle, ct.byref(posed), ct.byref(options), ct.byref(target))
+        with _told(options, None):
+            _call("vg_render", self._handle, ct.byref(posed), ct.byref(options), ct.byref(target))
         return Planes(np.ascontiguousarray(picture[..., :3]), alpha, depth)
 
     def render_backward(
@@ -1060,7 +1268,8 @@ class Gaussians:
             setattr(out, field, values.ctypes.data)
         out.count, out.sh_degree = n, self.sh_degree
         arguments = (ct.byref(posed), ct.byref(options), None, ct.byref(gradient), ct.byref(out))
-        _call("vg_render_backward", self._handle, *arguments)
+        with _told(options, None):
+            _call("vg_render_backward", self._handle, *arguments)
         return made
 
     def _array(self, name: str, *per_gaussian: int) -> npt.NDArray[np.float32]:
@@ -1159,6 +1368,7 @@ class Renderer(_Handle):
         background: _types.Background = "white",
         *,
         antialiased: bool = False,
+        progress: Progress | None = None,
         context: Context | None = None,
     ) -> npt.NDArray[np.uint8]:
         """Pictures of cameras of one size: uint8 (n, height, width, 3), or 4 with straight alpha on a "transparent"
@@ -1175,7 +1385,8 @@ class Renderer(_Handle):
             target.width, target.height = camera.width, camera.height
             target.color, target.color_format = picture.ctypes.data, format
         array = (vg_camera * len(posed))(*posed)
-        _call("vg_renderer_render", self, array, len(posed), ct.byref(options), targets)
+        with _told(options, progress):
+            _call("vg_renderer_render", self, array, len(posed), ct.byref(options), targets)
         return pictures
 
 
@@ -1205,6 +1416,16 @@ class Points(NamedTuple):
     """Metres, float32 (n, 3)."""
     colors: npt.NDArray[np.uint8]
     """sRGB, uint8 (n, 3)."""
+
+
+@documented
+class Refined(NamedTuple):
+    """What a refinement comes back as."""
+
+    gaussians: Gaussians
+    """The best that was found."""
+    report: dict[str, Any]
+    """How many steps were planned, made and kept, why it ended, and the PSNR before and after."""
 
 
 @equal_by_value
@@ -1246,7 +1467,7 @@ def reconstruct(
     refine_hold_out: bool = False,
     refine_backend: _types.Backend = "auto",
     names: Iterable[str] | None = None,
-    progress: Callable[[str, float], object] | None = None,
+    progress: Progress | None = None,
     log: Callable[[LogLevel, str], object] | None = None,
     context: Context | None = None,
 ) -> Reconstruction:
@@ -1254,31 +1475,8 @@ def reconstruct(
 
     Pictures whose pixels lie together are read where they are, whatever lies between their rows.
     """
-    images, cameras = listed(images, "images", 3), listed(cameras, "cameras")
-    n = len(images)
-    if n == 0:
-        raise bad_value("images", "none", "at least one")
-    columns: dict[str, list[Any]] = {
-        "cameras": cameras,
-        "masks": [None] * n if masks is None else listed(masks, "masks", 2),
-        "depths": [None] * n if depths is None else listed(depths, "depths", 2),
-        "names": [f"{i:03}" for i in range(n)] if names is None else listed(names, "names"),
-    }
-    for argument, column in columns.items():
-        if len(column) != n:
-            raise VgError(Status.ARGUMENT, f"{argument}: {len(column)} entries; allowed: {n}, one per image")
     alive: list[Any] = []
-    views = (vg_view * n)()
-    for i, image in enumerate(images):
-        views[i] = _initial(vg_view)
-        views[i].name = _name(columns["names"][i], f"names[{i}]")
-        views[i].camera = _camera(cameras[i], f"cameras[{i}]")
-        views[i].image = _photograph(image, f"images[{i}]", alive)
-        if columns["masks"][i] is not None:
-            views[i].mask = _mask(columns["masks"][i], f"masks[{i}]", alive)
-        if columns["depths"][i] is not None:
-            views[i].depth = _depth(columns["depths"][i], f"depths[{i}]", alive)
-
+    views = _views(images, masks, cameras, depths, names, alive)
     options = _initial(vg_options)
     options.context = _lent_context(context)
     options.prior, options.symmetry = _choice(Prior, "prior", prior), _choice(Symmetry, "symmetry", symmetry)
@@ -1312,36 +1510,129 @@ def reconstruct(
     options.check, options.points = check, points
     if vehicle_size is not None:
         options.vehicle_size[:] = doubles(vehicle_size, "vehicle_size", (3,)).tolist()
+    car, report = ct.c_void_p(), ct.c_void_p()
+    with _told(options, progress) as raised:
+        options.log = LogFn(_logger(log, raised)) if log is not None else LogFn()
+        _call("vg_reconstruct", views, len(views), ct.byref(options), ct.byref(car), ct.byref(report))
+        gaussians, made = Gaussians(_Handle("gaussians", car)), _Handle("report", report)
+    lifted = None
+    if points:
+        count = int(library.vg_report_point_count(made))
+        lifted = Points(
+            made.array(library.vg_report_point_positions(made), (count, 3), np.float32),
+            made.array(library.vg_report_point_colors(made), (count, 3), np.uint8),
+        )
+    told = json.loads(library.vg_report_json(made))
+    reconstructed(told)
+    return Reconstruction(gaussians, told, lifted)
+
+
+def _views(
+    images: Iterable[Any],
+    masks: Iterable[Any] | None,
+    cameras: Iterable[Camera],
+    depths: Iterable[Any] | None,
+    names: Iterable[str] | None,
+    alive: list[Any],
+) -> ct.Array[vg_view]:
+    """Views that look at the arrays in ``alive``."""
+    pictures = listed(images, "images", 3)
+    n = len(pictures)
+    if n == 0:
+        raise bad_value("images", "none", "at least one")
+    columns: dict[str, list[Any]] = {
+        "cameras": listed(cameras, "cameras"),
+        "masks": [None] * n if masks is None else listed(masks, "masks", 2),
+        "depths": [None] * n if depths is None else listed(depths, "depths", 2),
+        "names": [f"{i:03}" for i in range(n)] if names is None else listed(names, "names"),
+    }
+    for argument, column in columns.items():
+        if len(column) != n:
+            raise VgError(Status.ARGUMENT, f"{argument}: {len(column)} entries; allowed: {n}, one per image")
+    views = (vg_view * n)()
+    for i, image in enumerate(pictures):
+        views[i] = _initial(vg_view)
+        views[i].name = _name(columns["names"][i], f"names[{i}]")
+        views[i].camera = _camera(columns["cameras"][i], f"cameras[{i}]")
+        views[i].image = _photograph(image, f"images[{i}]", alive)
+        if columns["masks"][i] is not None:
+            views[i].mask = _mask(columns["masks"][i], f"masks[{i}]", alive)
+        if columns["depths"][i] is not None:
+            views[i].depth = _depth(columns["depths"][i], f"depths[{i}]", alive)
+    return views
+
+
+def refine(
+    gaussians: Gaussians,
+    scene: Scene,
+    *,
+    iterations: int | None = None,
+    seconds: float | None = None,
+    hold_out: bool = False,
+    densify: bool = False,
+    backend: Literal["auto", "cpu", "gpu"] = "auto",
+    progress: Progress | None = None,
+    context: Context | None = None,
+) -> Refined:
+    """Moves the Gaussians of any model until their pictures are the photographs of a scene; the arguments are those of
+    vehicle_gaussians.refine."""
+    alive: list[Any] = []
+    views = _views(scene.images, scene.masks, scene.cameras, scene.depths, scene.names, alive)
+    options, done, made = _initial(vg_refine_options), _initial(vg_refinement), ct.c_void_p()
+    options.context = _lent_context(context)
+    if iterations is not None:
+        options.iterations = whole(iterations, "iterations", 1, _U32, "1 to 1000000")
+    if seconds is not None:
+        if iterations is not None:
+            raise bad_value("seconds", f"{seconds:g}, with iterations {iterations}", "one of both")
+        # Of C, 0 is none.
+        if seconds == 0:
+            raise bad_value("seconds", seconds, "above 0, at most 86400")
+        options.seconds = real(seconds, "seconds")
+    options.hold_out, options.densify = hold_out, densify
+    options.backend = _choice(Backend, "backend", backend)
+    handle = _lent_gaussians(gaussians)
+    with _told(options, progress):
+        _call("vg_refine", handle, views, len(views), ct.byref(options), ct.byref(made), ct.byref(done))
+        refined = Gaussians(_Handle("gaussians", made))
+    held_out = [done.held_out_before_db, done.held_out_after_db]
+    report = {
+        **{name: getattr(done, name) for name in ("iterations", "made", "kept")},
+        "stop": RefineStop(done.stop).name.lower(),
+        "psnr_db": [done.psnr_before_db, done.psnr_after_db],
+        "held_out": None if held_out[0] != held_out[0] else {"psnr_db": held_out},
+    }
+    return Refined(refined, report)
+
+
+@contextlib.contextmanager
+def _told(options: Any, progress: Progress | None) -> Iterator[list[BaseException]]:
+    """Has a call with these options tell ``progress`` how far it is, and end at Ctrl-C. Hands out the list of what was
+    raised in callbacks, of which the first is raised at the end."""
     raised: list[BaseException] = []
+    tell, overall = None if progress is None else teller(progress), ct.c_double()
 
     def on_progress(stage: bytes, fraction: float, _: object) -> int:
         try:
-            return int(bool(raised) or (progress is not None and bool(progress(stage.decode(), fraction))))
+            told = overall.value if has_stages else fraction
+            return int(bool(raised) or not (tell is None or tell(stage.decode(), fraction, told)))
         except BaseException as error:
             raised.append(error)
             return 1
 
+    has_stages = isinstance(options, vg_options)
+    if has_stages:
+        options.progress_overall = ct.pointer(overall)
     # Always there: between two calls of it Python cannot see Ctrl-C.
     options.progress = ProgressFn(on_progress)
-    options.log = LogFn(_logger(log, raised)) if log is not None else LogFn()
-    car, report = ct.c_void_p(), ct.c_void_p()
     try:
         with _signals_kept(raised):
-            _call("vg_reconstruct", views, n, ct.byref(options), ct.byref(car), ct.byref(report))
+            yield raised
     except VgError:
         if not raised:
             raise
-    gaussians, told = Gaussians(_Handle("gaussians", car)), _Handle("report", report)
     if raised:
         raise raised[0]
-    lifted = None
-    if points:
-        count = int(library.vg_report_point_count(told))
-        lifted = Points(
-            told.array(library.vg_report_point_positions(told), (count, 3), np.float32),
-            told.array(library.vg_report_point_colors(told), (count, 3), np.uint8),
-        )
-    return Reconstruction(gaussians, json.loads(library.vg_report_json(told)), lifted)
 
 
 @contextlib.contextmanager
@@ -1504,13 +1795,18 @@ def _picture(array: npt.NDArray[Any], argument: str, alive: list[Any]) -> vg_ima
 
 
 def picture_errors(
-    a: npt.NDArray[Any], b: npt.NDArray[Any], *, lpips: Model | None = None, context: Context | None = None
+    a: npt.NDArray[Any],
+    b: npt.NDArray[Any],
+    *,
+    data_range: float | None = None,
+    lpips: Model | None = None,
+    context: Context | None = None,
 ) -> PictureErrors:
-    """The difference of two pictures of one size, uint8 or float32 in [0, 1], (height, width, 3 or 4).
-
-    What their alpha leaves open is white.
+    """The difference of two pictures of one size, uint8 or floats in [0, 1], (height, width, 3 or 4); the arguments are
+    those of vehicle_gaussians.picture_errors.
     """
     alive: list[Any] = []
+    a, b = in_range(a, data_range), in_range(b, data_range)
     pictures = _picture(a, "a", alive), _picture(b, "b", alive)
     options, errors = _metrics_options(lpips, 0.05, context), _initial(vg_picture_errors)
     _call("vg_metrics_pictures", *map(ct.byref, pictures), ct.byref(options), ct.byref(errors))
@@ -1536,7 +1832,8 @@ def view_errors(
     if depth is not None:
         view.depth = _depth(depth, "depth", alive)
     options, errors = _metrics_options(lpips, 0.05, context), _initial(vg_view_errors)
-    _call("vg_metrics_view", _lent_gaussians(gaussians), ct.byref(view), ct.byref(options), ct.byref(errors))
+    with _told(options, None):
+        _call("vg_metrics_view", _lent_gaussians(gaussians), ct.byref(view), ct.byref(options), ct.byref(errors))
     return ViewErrors(*_measures(errors))  # type: ignore[arg-type]
 
 
@@ -1550,7 +1847,8 @@ def surface_errors(
     scan = _measured(points, "points")
     options, errors = _metrics_options(None, f_score, context), _initial(vg_surface_errors)
     lists = (_lent_gaussians(gaussians), scan.ctypes.data, len(scan))
-    _call("vg_metrics_surface", *lists, ct.byref(options), ct.byref(errors))
+    with _told(options, None):
+        _call("vg_metrics_surface", *lists, ct.byref(options), ct.byref(errors))
     return SurfaceErrors(*_measures(errors))  # type: ignore[arg-type]
 
 
@@ -1601,6 +1899,7 @@ def align_scan(
     *,
     heading: _types.Heading = "auto",
     names: Sequence[str] | None = None,
+    progress: Progress | None = None,
     context: Context | None = None,
 ) -> Alignment:
     """The vehicle's frame by points scanned on the vehicle; the arguments are those of vehicle_gaussians.align_scan."""
@@ -1608,7 +1907,9 @@ def align_scan(
     views, found = _masked_views(masks, cameras, names, alive), _initial(vg_alignment)
     world, scanned = _points(sparse, "sparse"), _measured(scan, "scan")
     lists = (views, len(views), world.ctypes.data, len(world), scanned.ctypes.data, len(scanned))
-    _call("vg_align_scan", *lists, ct.byref(_align_options(heading, context)), ct.byref(found))
+    options = _align_options(heading, context)
+    with _told(options, progress):
+        _call("vg_align_scan", *lists, ct.byref(options), ct.byref(found))
     return _alignment(found)
 
 
@@ -1620,6 +1921,7 @@ def align_box(
     *,
     heading: Literal["forward", "backward"],
     names: Sequence[str] | None = None,
+    progress: Progress | None = None,
     context: Context | None = None,
 ) -> Alignment:
     """The vehicle's frame by its size and the ground; the arguments are those of vehicle_gaussians.align_box."""
@@ -1627,7 +1929,9 @@ def align_box(
     views, found = _masked_views(masks, cameras, names, alive), _initial(vg_alignment)
     world, sides = _points(sparse, "sparse"), doubles(size, "size", (3,))
     lists = (views, len(views), world.ctypes.data, len(world), sides.ctypes.data)
-    _call("vg_align_box", *lists, ct.byref(_align_options(heading, context)), ct.byref(found))
+    options = _align_options(heading, context)
+    with _told(options, progress):
+        _call("vg_align_box", *lists, ct.byref(options), ct.byref(found))
     return _alignment(found)
 
 
@@ -1648,12 +1952,14 @@ def align_folder(
     scan: str | os.PathLike[str] | None = None,
     *,
     heading: _types.Heading = "auto",
+    progress: Progress | None = None,
     context: Context | None = None,
 ) -> Alignment:
     """align_scan with the files of a scene; the arguments are those of vehicle_gaussians.align_folder."""
     found, file = _initial(vg_alignment), None if scan is None else os.fsencode(scan)
     options = _align_options(heading, context)
-    _call("vg_align_folder", os.fsencode(path), file, ct.byref(options), ct.byref(found))
+    with _told(options, progress):
+        _call("vg_align_folder", os.fsencode(path), file, ct.byref(options), ct.byref(found))
     return _alignment(found)
 
 
@@ -1680,6 +1986,7 @@ def open_scene(
     *,
     depth_scale: float | None = None,
     load_depth: bool = True,
+    progress: Progress | None = None,
     context: Context | None = None,
 ) -> Scene:
     """Opens a transforms.json, a folder with one, or a COLMAP folder; the arguments are those of
@@ -1695,16 +2002,16 @@ def open_scene(
         options.names, options.name_count = names, len(wanted)
     options.depth_scale, options.load_depth = real(depth_scale or 0.0, "depth_scale"), load_depth
     notes: list[str] = []
-    raised: list[BaseException] = []
-    options.log = LogFn(_logger(lambda _, note: notes.append(note), raised))
     path = Path(path)
     has_transforms = path.is_file() or (path / "transforms.json").is_file()
     made = ct.c_void_p()
     name = "vg_transforms_open" if has_transforms else "vg_colmap_open"
-    _call(name, os.fsencode(path), ct.byref(options), ct.byref(made))
-    handle = _Handle("scene", made)
+    with _told(options, progress) as raised:
+        options.log = LogFn(_logger(lambda _, note: notes.append(note), raised))
+        _call(name, os.fsencode(path), ct.byref(options), ct.byref(made))
+        handle = _Handle("scene", made)
     for note in notes:
-        warnings.warn(note, stacklevel=2)
+        warn(note)
 
     scene = Scene([], [], [], [], [])
     for i in range(library.vg_scene_view_count(handle)):
@@ -1717,3 +2024,22 @@ def open_scene(
         scene.cameras.append(vg_camera.from_buffer_copy(view.camera))
         scene.names.append(_utf8(view.name))
     return scene
+
+
+def evaluate(
+    gaussians: Gaussians,
+    scene: Scene | str | os.PathLike[str],
+    views: str | Iterable[str] | None = None,
+    vehicle_from_world: npt.ArrayLike | None = None,
+    *,
+    lpips: Model | None = None,
+    progress: Progress | None = None,
+    context: Context | None = None,
+) -> list[ViewScore]:
+    """The errors of a model in every view of a scene, one row a view; the arguments are those of
+    vehicle_gaussians.evaluate."""
+    if not isinstance(scene, Scene):
+        scene = open_scene(scene, views, vehicle_from_world, context=context)
+    elif views is not None or vehicle_from_world is not None:
+        raise bad_value("views, vehicle_from_world", "given with an open scene", "with a path")
+    return rows(scene, lambda *view: view_errors(gaussians, *view, lpips=lpips, context=context), progress)

@@ -16,7 +16,8 @@ use vg::symmetry::SymmetryMode;
 #[derive(Args)]
 pub(crate) struct MethodArgs {
     /// Depth source: the scene's own depth; the visual hull; the hull corrected by what vehicles look like (shape);
-    /// the network of --prior-model (onnx); or (auto) the first if every used view has depth, else shape
+    /// the network of --prior-model (onnx); or (auto) the first if every used view has depth, else shape, which bends to
+    /// the depth of the views that have it
     #[arg(long, value_enum, default_value_t = Prior::Auto)]
     prior: Prior,
     /// The geometry network of --prior onnx: an ONNX file in the contract of docs/ONNX.md

@@ -17,6 +17,7 @@ use super::tile::{TILE_HEIGHT, TILE_WIDTH, Tile};
 use super::{PROJECT_CHUNK, Scratch};
 use crate::gaussians::Gaussians;
 use crate::geometry::Camera;
+use crate::progress::Watch;
 use crate::render::view::PinholeView;
 use crate::render::{Gradients, PictureGradient, PoseGradient, RenderOptions};
 pub(in crate::render) use blend::SplatSums;
@@ -74,13 +75,14 @@ struct Worker {
 }
 
 /// Of what has been projected and sorted into `scratch`; `binned` says that its stripes list the whole picture.
-/// `largest` is the largest magnitude in `gradient`.
+/// `largest` is the largest magnitude in `gradient`. Of stopped work `out` holds nothing in particular.
 pub(super) fn backward<S: Lanes>(
     simd: S,
     gaussians: &Gaussians,
     camera: &Camera,
     options: &RenderOptions,
     pair_budget: u64,
+    watch: &Watch,
     scratch: &mut Scratch,
     binned: bool,
     (gradient, largest): (&PictureGradient, f32),
@@ -102,7 +104,10 @@ pub(super) fn backward<S: Lanes>(
         if !(whole && binned) {
             bin::bin(&window, order, bounds, stripes);
         }
-        walk_tiles(simd, &window, stripes, splats, options, gradient, scale, workers, tiles);
+        walk_tiles(simd, &window, stripes, splats, options, gradient, scale, watch, workers, tiles);
+        if watch.is_stopped() {
+            return times;
+        }
         let walked = Instant::now();
         add_shares(tiles, sums);
         for tile in tiles.iter() {
@@ -162,12 +167,16 @@ fn walk_tiles<S: Lanes>(
     options: &RenderOptions,
     gradient: &PictureGradient,
     scale: f64,
+    watch: &Watch,
     workers: &Mutex<Vec<Box<Worker>>>,
     tiles: &mut Vec<TileShare>,
 ) {
     let columns = window.columns.len();
     tiles.resize_with(window.rows.len() * columns, TileShare::default);
     tiles.par_iter_mut().with_max_len(1).enumerate().for_each(|(i, share)| {
+        if watch.is_stopped() {
+            return;
+        }
         let (row, column) = (window.rows.start + i / columns, window.columns.start + i % columns);
         let origin = [column * TILE_WIDTH, row * TILE_HEIGHT];
         let list = bin::stripe_of(stripes, row).tile(column, row);
