@@ -75,6 +75,9 @@ unsafe fn run(
 
 unsafe fn log(log: Log, report: &Report) {
     unsafe {
+        for reason in &report.verdict_reasons {
+            log.line(vg_log_level::Warning, || reason.to_string());
+        }
         for left in &report.left_out {
             log.line(vg_log_level::Info, || format!("left out {} {}: {}", left.count, left.what, left.why));
         }

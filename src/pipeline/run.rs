@@ -1,10 +1,11 @@
 //! The run: plan -> undistort -> calibrate -> prior -> pixels -> head -> symmetry -> check.
 
-use super::check::input_error;
+use super::check::checked;
 use super::options::{Calibrate, Options, PriorChoice};
 use super::pixels::{self, BETTER};
-use super::report::{Clock, LeftOut, Report, peak_rss_bytes};
+use super::report::{Clock, InputError, LeftOut, Report, peak_rss_bytes};
 use super::spread::spread;
+use super::verdict::{self, Examined, Judged};
 use super::{baseline, budget, cost, plan};
 use crate::calibrate::{self, Calibrated, Moved};
 use crate::error::{Error, Result};
@@ -85,17 +86,17 @@ pub fn reconstruct_on<'a>(
     clock.lap("plan");
 
     context.report("undistort", 0.0)?;
-    let views = undistorted(scene, &used, options, &mut left_out, &context)?;
+    let given = undistorted(scene, &used, options, &mut left_out, &context)?;
     clock.lap("undistort");
 
     context.report("calibrate", 0.0)?;
     let Calibrated { moved, report: calibration, left_out: why } = match options.calibrate {
-        Calibrate::Auto => calibrate::calibrate(&views, &context)?,
+        Calibrate::Auto => calibrate::calibrate(&given, &context)?,
         Calibrate::Off => Calibrated::default(),
     };
     plan::note(&mut left_out, "calibration", why.unwrap_or_default(), usize::from(why.is_some()));
     // From here to the symmetry all is in the frame whose y = 0 is the plane that was found.
-    let seen = moved.as_ref().map_or(views, |moved| moved.views.clone());
+    let seen = moved.as_ref().map_or_else(|| given.clone(), |moved| moved.views.clone());
     let views = match options.symmetry {
         SymmetryMode::Flip => seen.iter().cloned().chain(seen.iter().map(mirror::mirrored)).collect(),
         _ => seen.clone(),
@@ -150,15 +151,29 @@ pub fn reconstruct_on<'a>(
         None => (gaussians, None),
     };
     clock.lap("refine");
+
+    let originals: Vec<&View> = used.iter().map(|&i| &scene.views[i]).collect();
+    let examined = Examined { given: &originals, used: &seen, geometry: Some(&geometry) };
+    let evidence = match options.check {
+        true => verdict::compare(&examined, &context),
+        false => verdict::glance(&examined),
+    };
     let (gaussians, points, views) = match &moved {
         Some(moved) => back_in_vehicle(&gaussians, points, moved, &context)?,
         None => (gaussians, points, seen),
     };
-
-    let input_error = match options.check {
-        true => Some(input_error(&gaussians, &views, &context)?),
-        false => None,
+    let evidence = evidence.with_model(&gaussians, &views);
+    let input_views = match options.check {
+        true => checked(&gaussians, &views, &given, &context)?,
+        false => Vec::new(),
     };
+    let reasons = verdict::judge(&Judged {
+        evidence: &evidence,
+        checked: &input_views,
+        calibration: calibration.as_ref(),
+        has_depth: matches!(source, PriorChoice::Given | PriorChoice::Onnx),
+        is_completed: options.symmetry != SymmetryMode::Never,
+    });
     clock.lap("check");
 
     let (stages, total_ms) = clock.finish();
@@ -185,7 +200,12 @@ pub fn reconstruct_on<'a>(
         symmetry: completion,
         relight,
         refinement,
-        input_error,
+        input_error: InputError::over(input_views.iter().map(|view| view.errors)),
+        input_error_by_given_cameras: InputError::over(input_views.iter().map(|view| view.by_given_camera)),
+        input_views,
+        verdict: verdict::verdict(&reasons),
+        verdict_reasons: reasons,
+        evidence,
         settings: options.clone(),
     };
     Ok(Reconstruction { gaussians, points, report })

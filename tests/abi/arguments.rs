@@ -195,7 +195,7 @@ fn expected(outcome: Outcome, words: String) -> Expect {
 const SIZED: [&str; 2] = ["vg_report_get_figures", "vg_scene_get_view"];
 
 /// Functions that cannot fail, all called by `what_cannot_fail_accepts_null`.
-const NEVER_FAIL: [&str; 26] = [
+const NEVER_FAIL: [&str; 27] = [
     "vg_version",
     "vg_abi_version",
     "vg_error_code",
@@ -204,6 +204,7 @@ const NEVER_FAIL: [&str; 26] = [
     "vg_context_threads",
     "vg_context_free",
     "vg_report_json",
+    "vg_report_reason",
     "vg_report_point_count",
     "vg_report_point_positions",
     "vg_report_point_colors",
@@ -244,6 +245,7 @@ fn what_cannot_fail_accepts_null() {
         assert_eq!(vg_error_code(null()), vg_status::Ok);
         assert_eq!(CStr::from_ptr(vg_error_message(null())), c"");
         assert_eq!(CStr::from_ptr(vg_report_json(null())), c"");
+        assert_eq!(CStr::from_ptr(vg_report_reason(null(), 0)), c"");
         assert_eq!(vg_context_threads(null()), 0);
         assert_eq!(vg_report_point_count(null()), 0);
         assert!(vg_report_point_positions(null()).is_null() && vg_report_point_colors(null()).is_null());

@@ -31,6 +31,7 @@ from ._native import (
 )
 from ._reconstruct import Points, Reconstruction, reconstruct
 from ._scene import Scene, open_scene
+from ._warn import VgWarning
 
 __all__ = [
     "Alignment",
@@ -47,6 +48,7 @@ __all__ = [
     "Status",
     "SurfaceErrors",
     "VgError",
+    "VgWarning",
     "ViewErrors",
     "__version__",
     "align_box",

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from . import _native
 from ._native import Camera, Gaussians, Model
+from ._warn import warn_of_verdict
 
 #: Masks are bool, or uint8 where 128 and above is vehicle.
 Mask: TypeAlias = npt.NDArray[np.bool_] | npt.NDArray[np.uint8]
@@ -134,4 +135,6 @@ def reconstruct(
         names=None if names is None else list(names),
         progress=progress,
     )
-    return Reconstruction(gaussians, json.loads(report), None if lifted is None else Points(*lifted))
+    facts = json.loads(report)
+    warn_of_verdict(facts)
+    return Reconstruction(gaussians, facts, None if lifted is None else Points(*lifted))

@@ -37,6 +37,7 @@ from ._alignment import Alignment
 from ._errors import Status, VgError
 from ._gradients import Gradients, Planes
 from ._measures import PictureErrors, SurfaceErrors, ViewErrors
+from ._warn import warn_of_verdict
 
 #: The binary interface that this module is written for.
 ABI_VERSION = 0
@@ -112,6 +113,12 @@ class Calibration(enum.IntEnum):
     """vg_calibration"""
 
     NONE, NOT_NEEDED, ACCEPTED, REFUSED = range(4)
+
+
+class Verdict(enum.IntEnum):
+    """vg_verdict"""
+
+    GOOD, DOUBTFUL, BAD = range(3)
 
 
 class Backend(enum.IntEnum):
@@ -261,6 +268,12 @@ class vg_report_figures(ct.Structure):
         ("uncovered_after", ct.c_double),
         ("refine_iterations", ct.c_uint32),
         ("refine_kept", ct.c_uint32),
+        ("input_mask_covered", ct.c_double),
+        ("input_given_psnr_db", ct.c_double),
+        ("input_given_silhouette_iou", ct.c_double),
+        ("input_given_mask_covered", ct.c_double),
+        ("verdict", ct.c_int32),
+        ("reason_count", ct.c_uint32),
     )
 
 
@@ -463,6 +476,7 @@ PROTOTYPES: Mapping[str, tuple[Any, tuple[Any, ...]]] = {
     "vg_report_figures_init": (_i32, (_pointer(vg_report_figures), _size)),
     "vg_report_get_figures": (_i32, (_handle, _pointer(vg_report_figures), _out)),
     "vg_report_json": (_text, (_handle,)),
+    "vg_report_reason": (_text, (_handle, _size)),
     "vg_report_point_count": (_size, (_handle,)),
     "vg_report_point_positions": (_numbers, (_handle,)),
     "vg_report_point_colors": (_numbers, (_handle,)),
@@ -1256,7 +1270,9 @@ def reconstruct(
             told.array(library.vg_report_point_positions(told), (count, 3), np.float32),
             told.array(library.vg_report_point_colors(told), (count, 3), np.uint8),
         )
-    return Reconstruction(gaussians, json.loads(library.vg_report_json(told)), lifted)
+    facts = json.loads(library.vg_report_json(told))
+    warn_of_verdict(facts)
+    return Reconstruction(gaussians, facts, lifted)
 
 
 @contextlib.contextmanager
