@@ -82,6 +82,10 @@ enum Fault {
     MasksOff,
     PhotographsOff,
     FramesOff,
+    /// The second view has the third's photograph.
+    OnePhotographOff,
+    /// The second camera goes around the vehicle's axis by so many degrees.
+    OnePoseTurned(f64),
     /// The second view and the third.
     TwoFramesSwapped,
     /// x and y of the poses' world; y and z, with a sign so that it is a rotation.
@@ -100,14 +104,24 @@ enum Fault {
     OneLens(f64),
     /// The depth's metres.
     DepthScaled(f32),
+    /// The second view's depth.
+    OneDepthScaled(f32),
     /// Each view has the next one's depth.
     DepthOff,
 }
 
 const CASES: &[Case] = &[
     Case { name: "as given", fault: Fault::None, expected: Expected::Good },
-    Case { name: "each camera off by 0.3 degrees and 3 cm (sigma)", fault: Fault::Jitter, expected: Expected::Good },
-    Case { name: "plane yawed by 2 degrees, shifted by 5 cm", fault: Fault::PlaneTurned, expected: Expected::Good },
+    Case {
+        name: "each camera off by 0.3 degrees and 3 cm (sigma)",
+        fault: Fault::Jitter,
+        expected: Expected::Good,
+    },
+    Case {
+        name: "plane yawed by 2 degrees, shifted by 5 cm",
+        fault: Fault::PlaneTurned,
+        expected: Expected::Good,
+    },
     Case { name: "masks eroded by 2 px", fault: Fault::Eroded(2), expected: Expected::Good },
     Case { name: "masks dilated by 2 px", fault: Fault::Dilated(2), expected: Expected::Good },
     Case { name: "half of one mask missing", fault: Fault::HalfOccluded, expected: Expected::Open },
@@ -115,15 +129,45 @@ const CASES: &[Case] = &[
     Case { name: "all masks inverted", fault: Fault::AllMasksInverted, expected: Expected::Bad },
     Case { name: "masks off by one frame", fault: Fault::MasksOff, expected: Expected::Bad },
     Case { name: "photographs off by one frame", fault: Fault::PhotographsOff, expected: Expected::Bad },
-    Case { name: "photographs, masks and depth off by one frame", fault: Fault::FramesOff, expected: Expected::Bad },
+    Case {
+        name: "photographs, masks and depth off by one frame",
+        fault: Fault::FramesOff,
+        expected: Expected::Bad,
+    },
+    Case { name: "one photograph of another frame", fault: Fault::OnePhotographOff, expected: Expected::Bad },
+    Case {
+        name: "one pose off by 10 degrees around the vehicle",
+        fault: Fault::OnePoseTurned(10.0),
+        expected: Expected::Bad,
+    },
     Case { name: "two frames swapped", fault: Fault::TwoFramesSwapped, expected: Expected::Bad },
     Case { name: "axes x and y swapped", fault: Fault::AxesXy, expected: Expected::Bad },
     Case { name: "axes y and z swapped", fault: Fault::AxesYz, expected: Expected::Bad },
-    Case { name: "poses x 0.022 (a vehicle of 10 cm)", fault: Fault::PosesScaled(0.022), expected: Expected::Bad },
-    Case { name: "poses x 0.18 (a vehicle of 0.8 m)", fault: Fault::PosesScaled(0.18), expected: Expected::Bad },
-    Case { name: "poses x 0.3048 (feet taken for metres, inverted)", fault: Fault::PosesScaled(0.3048), expected: Expected::Bad },
-    Case { name: "poses x 3.281 (feet taken for metres)", fault: Fault::PosesScaled(3.281), expected: Expected::Bad },
-    Case { name: "poses x 1000 (mm taken for metres)", fault: Fault::PosesScaled(1000.0), expected: Expected::Bad },
+    Case {
+        name: "poses x 0.022 (a vehicle of 10 cm)",
+        fault: Fault::PosesScaled(0.022),
+        expected: Expected::Bad,
+    },
+    Case {
+        name: "poses x 0.18 (a vehicle of 0.8 m)",
+        fault: Fault::PosesScaled(0.18),
+        expected: Expected::Bad,
+    },
+    Case {
+        name: "poses x 0.3048 (feet taken for metres, inverted)",
+        fault: Fault::PosesScaled(0.3048),
+        expected: Expected::Bad,
+    },
+    Case {
+        name: "poses x 3.281 (feet taken for metres)",
+        fault: Fault::PosesScaled(3.281),
+        expected: Expected::Bad,
+    },
+    Case {
+        name: "poses x 1000 (mm taken for metres)",
+        fault: Fault::PosesScaled(1000.0),
+        expected: Expected::Bad,
+    },
     Case { name: "plane off by 0.3 m", fault: Fault::PlaneOff(0.3), expected: Expected::Bad },
     Case { name: "plane off by 0.6 m", fault: Fault::PlaneOff(0.6), expected: Expected::Bad },
     Case { name: "plane off by 1 m", fault: Fault::PlaneOff(1.0), expected: Expected::Bad },
@@ -136,12 +180,17 @@ const CASES: &[Case] = &[
     Case { name: "depth in feet", fault: Fault::DepthScaled(3.281), expected: Expected::Bad },
     Case { name: "depth x 0.3048", fault: Fault::DepthScaled(0.3048), expected: Expected::Bad },
     Case { name: "depth x 1.2", fault: Fault::DepthScaled(1.2), expected: Expected::Bad },
+    Case {
+        name: "depth of one view in millimetres",
+        fault: Fault::OneDepthScaled(1000.0),
+        expected: Expected::Bad,
+    },
     Case { name: "depth off by one frame", fault: Fault::DepthOff, expected: Expected::Bad },
 ];
 
 impl Fault {
     fn is_of_depth(self) -> bool {
-        matches!(self, Self::DepthScaled(_) | Self::DepthOff)
+        matches!(self, Self::DepthScaled(_) | Self::OneDepthScaled(_) | Self::DepthOff)
     }
 
     /// Test views move with the frame where it is only another one of the same vehicle.
@@ -157,7 +206,10 @@ impl Fault {
             Self::PlaneTurned => {
                 let mut side = || if random.bits() & 1 == 0 { 1.0 } else { -1.0 };
                 let rotation = DMat3::from_rotation_z(side() * 2f64.to_radians());
-                move_frame([input, test], Pose { rotation, translation: DVec3::new(0.0, side() * 0.05, 0.0) });
+                move_frame(
+                    [input, test],
+                    Pose { rotation, translation: DVec3::new(0.0, side() * 0.05, 0.0) },
+                );
             }
             Self::Eroded(px) => masks(views, |mask| grown(mask, px, Label::Background))?,
             Self::Dilated(px) => masks(views, |mask| grown(mask, px, Label::Vehicle))?,
@@ -168,6 +220,14 @@ impl Fault {
             Self::PhotographsOff => off_by_one(views, |view, next| view.image = next.image.clone()),
             Self::DepthOff => off_by_one(views, |view, next| view.depth = next.depth.clone()),
             Self::FramesOff => off_by_one(views, |view, next| view.camera = next.camera),
+            Self::OnePhotographOff => views[1].image = views[2 % n].image.clone(),
+            Self::OnePoseTurned(degrees) => {
+                let pose = &mut views[1].camera.vehicle_from_camera;
+                *pose = turned(DMat3::from_rotation_z(degrees.to_radians())).after(pose);
+            }
+            Self::OneDepthScaled(s) => {
+                views[1].depth = views[1].depth.as_ref().map(|depth| scaled(depth, s)).transpose()?;
+            }
             Self::TwoFramesSwapped => {
                 let camera = views[1].camera;
                 views[1].camera = views[2 % n].camera;
@@ -277,7 +337,12 @@ impl Vehicle {
         let scene = folder.file_name().unwrap_or_default().to_string_lossy();
         let one = |(key, mut split): (String, BTreeMap<String, Vec<String>>)| {
             let mut of = |name: &str| split.remove(name).ok_or_else(|| broken(format!("no {name}")));
-            Ok(Self { name: format!("{scene}/{key}"), folder: folder.into(), input: of("input")?, test: of("test")? })
+            Ok(Self {
+                name: format!("{scene}/{key}"),
+                folder: folder.into(),
+                input: of("input")?,
+                test: of("test")?,
+            })
         };
         splits.into_iter().map(one).collect()
     }
@@ -295,7 +360,8 @@ fn row(vehicles: &[Vehicle], case: &Case, depth: bool, arguments: &Arguments) ->
     let (mut refused, mut wrong, mut unseen) = (0, 0, Vec::new());
     let mut reasons: BTreeMap<String, usize> = BTreeMap::new();
     for (k, vehicle) in vehicles.iter().enumerate() {
-        let (mut input, mut test) = (vehicle.scene(&vehicle.input, depth)?, vehicle.scene(&vehicle.test, false)?);
+        let (mut input, mut test) =
+            (vehicle.scene(&vehicle.input, depth)?, vehicle.scene(&vehicle.test, false)?);
         if depth && input.views.iter().any(|view| view.depth.is_none()) {
             continue;
         }
@@ -394,14 +460,16 @@ impl Arguments {
         }
         let name = |p: &Path| p.file_name().unwrap_or_default().to_string_lossy().into_owned();
         found.retain(|p| self.only.is_empty() || self.only.contains(&name(p)));
-        let vehicles: Vec<Vec<Vehicle>> = found.iter().map(|folder| Vehicle::open(folder)).collect::<Result<_>>()?;
+        let vehicles: Vec<Vec<Vehicle>> =
+            found.iter().map(|folder| Vehicle::open(folder)).collect::<Result<_>>()?;
         Ok(vehicles.into_iter().flatten().collect())
     }
 
     /// A line of the figures' file.
     fn note(&self, vehicle: &Vehicle, case: &Case, depth: bool, found: &serde_json::Value) -> Result<()> {
         let Some(path) = &self.figures else { return Ok(()) };
-        let line = serde_json::json!({ "vehicle": vehicle.name, "case": case.name, "depth": depth, "found": found });
+        let line =
+            serde_json::json!({ "vehicle": vehicle.name, "case": case.name, "depth": depth, "found": found });
         let file = std::fs::OpenOptions::new().create(true).append(true).open(path);
         file.and_then(|mut file| writeln!(file, "{line}")).map_err(|e| Error::io(path, e))
     }

@@ -60,12 +60,14 @@ pub enum vg_calibration {
 #[repr(i32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum vg_verdict {
-    /// Nothing that was examined looks wrong. With `vg_options.check` 0, views are not compared with one another.
+    /// Nothing looks wrong.
     Good = 0,
+    /// Nothing looks wrong, but `vg_options.check` was 0: views were not compared with one another.
+    Unchecked = 1,
     /// Something looks wrong; the model may still be of use.
-    Doubtful = 1,
+    Doubtful = 2,
     /// The input contradicts itself, or describes no road vehicle.
-    Bad = 2,
+    Bad = 3,
 }
 
 /// The main figures of a report.
@@ -202,6 +204,7 @@ impl vg_report_figures {
         };
         let verdict = match report.verdict {
             pipeline::Verdict::Good => vg_verdict::Good,
+            pipeline::Verdict::Unchecked => vg_verdict::Unchecked,
             pipeline::Verdict::Doubtful => vg_verdict::Doubtful,
             pipeline::Verdict::Bad => vg_verdict::Bad,
         };
@@ -283,7 +286,9 @@ pub unsafe extern "C" fn vg_report_json(report: *const vg_report) -> *const c_ch
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn vg_report_reason(report: *const vg_report, index: usize) -> *const c_char {
     guarded_value(c"".as_ptr(), || {
-        unsafe { object(report) }.and_then(|r| r.reasons.get(index)).map_or(c"".as_ptr(), |line| line.as_ptr())
+        unsafe { object(report) }
+            .and_then(|r| r.reasons.get(index))
+            .map_or(c"".as_ptr(), |line| line.as_ptr())
     })
 }
 

@@ -133,7 +133,7 @@ fn numbers_of_rust() -> BTreeSet<String> {
         vg_relight { Auto Never }
         vg_status { Ok Argument Format Io Reconstruction Cancelled NotBuilt Internal Missing }
         vg_symmetry { Auto Always Never Flip }
-        vg_verdict { Good Doubtful Bad }
+        vg_verdict { Good Unchecked Doubtful Bad }
     }
     lines
 }

@@ -18,7 +18,8 @@ pub(super) fn checked(
 ) -> Result<Vec<CheckedView>> {
     let renderer = CpuRenderer::new();
     let error = |view: &View| -> Result<InputError> {
-        let drawn = context.parallel(|| renderer.render(gaussians, &view.camera, &RenderOptions::default()))?;
+        let drawn =
+            context.parallel(|| renderer.render(gaussians, &view.camera, &RenderOptions::default()))?;
         Ok(InputError {
             psnr_db: metrics::psnr(&drawn.color, &metrics::on_white(view)),
             silhouette_iou: metrics::silhouette_iou(&drawn.alpha, view),

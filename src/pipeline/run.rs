@@ -203,7 +203,7 @@ pub fn reconstruct_on<'a>(
         input_error: InputError::over(input_views.iter().map(|view| view.errors)),
         input_error_by_given_cameras: InputError::over(input_views.iter().map(|view| view.by_given_camera)),
         input_views,
-        verdict: verdict::verdict(&reasons),
+        verdict: verdict::verdict(&reasons, options.check),
         verdict_reasons: reasons,
         evidence,
         settings: options.clone(),

@@ -1317,6 +1317,39 @@ fn figures_tell_the_prior_and_its_box() {
             Some(other) => panic!("{other}"),
         };
         assert_eq!(figures.calibration, calibration as i32);
+        let verdict = match told["verdict"].as_str() {
+            Some("good") => vg_verdict::Good,
+            Some("unchecked") => vg_verdict::Unchecked,
+            Some("doubtful") => vg_verdict::Doubtful,
+            Some("bad") => vg_verdict::Bad,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(figures.verdict, verdict as i32);
+        let reasons = told["verdict_reasons"].as_array().unwrap();
+        assert_eq!(figures.reason_count as usize, reasons.len());
+        for (index, reason) in reasons.iter().enumerate() {
+            let line = unsafe { CStr::from_ptr(vg_report_reason(made.handle("out_report") as _, index)) };
+            assert!(line.to_str().unwrap().contains(reason["found"].as_str().unwrap()));
+        }
+        let beyond = unsafe { vg_report_reason(made.handle("out_report") as _, reasons.len()) };
+        assert_eq!(unsafe { CStr::from_ptr(beyond) }, c"");
+        for (error, [psnr, iou, covered]) in [
+            (
+                &told["input_error"],
+                [figures.input_psnr_db, figures.input_silhouette_iou, figures.input_mask_covered],
+            ),
+            (
+                &told["input_error_by_given_cameras"],
+                [
+                    figures.input_given_psnr_db,
+                    figures.input_given_silhouette_iou,
+                    figures.input_given_mask_covered,
+                ],
+            ),
+        ] {
+            let number = |name: &str| error[name].as_f64().unwrap();
+            assert_eq!([psnr, iou, covered], ["psnr_db", "silhouette_iou", "mask_covered"].map(number));
+        }
         let degrees = told["calibration"]["yaw_degrees"].as_f64().unwrap_or(0.0);
         assert!((figures.calibration_yaw_degrees - degrees).abs() < 1e-12);
     }

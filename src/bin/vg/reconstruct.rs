@@ -47,7 +47,12 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
     if let Some(path) = &args.report {
         files::write_json(path, &made.report)?;
     }
-    Ok(Outcome::done(format!("{}: {}{masks_by}{}", args.output.display(), summary(&made), views(&made.report))))
+    Ok(Outcome::done(format!(
+        "{}: {}{masks_by}{}",
+        args.output.display(),
+        summary(&made),
+        views(&made.report)
+    )))
 }
 
 /// What a user should hear of a reconstruction that went well.
@@ -68,7 +73,7 @@ pub(crate) fn note_warnings(report: &Report) {
 pub(crate) fn accept(report: &Report, strict: &StrictArgs) -> Result<()> {
     let least = match strict.strict {
         None => return Ok(()),
-        Some(Strict::Doubtful) => Verdict::Doubtful,
+        Some(Strict::Doubtful) => Verdict::Unchecked,
         Some(Strict::Bad) => Verdict::Bad,
     };
     if report.verdict < least {
@@ -82,6 +87,7 @@ pub(crate) fn accept(report: &Report, strict: &StrictArgs) -> Result<()> {
 pub(crate) fn verdict(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Good => "good",
+        Verdict::Unchecked => "unchecked",
         Verdict::Doubtful => "doubtful",
         Verdict::Bad => "bad",
     }
@@ -148,10 +154,15 @@ fn views(report: &Report) -> String {
         let CheckedView { name, errors, by_given_camera: given } = view;
         let given = match given == errors {
             true => String::new(),
-            false => format!(" ({:.2} dB, {:.3} by the camera as given)", given.psnr_db, given.silhouette_iou),
+            false => {
+                format!(" ({:.2} dB, {:.3} by the camera as given)", given.psnr_db, given.silhouette_iou)
+            }
         };
         let InputError { psnr_db, silhouette_iou, mask_covered } = errors;
-        format!("\n  {name}: {psnr_db:.2} dB, IoU {silhouette_iou:.3}{given}, {:.1} % covered", 100.0 * mask_covered)
+        format!(
+            "\n  {name}: {psnr_db:.2} dB, IoU {silhouette_iou:.3}{given}, {:.1} % covered",
+            100.0 * mask_covered
+        )
     };
     let more = match report.input_views.len().saturating_sub(MOST) {
         0 => String::new(),

@@ -6,14 +6,18 @@
 
 use crate::geometry::Intrinsics;
 use crate::prior::Geometry;
-use crate::prior::volume::{Silhouette, whereabouts};
 use crate::prior::volume::silhouette::central_ray;
+use crate::prior::volume::{Silhouette, whereabouts};
+use crate::scene::mask::Label;
 use crate::scene::{Mask, View};
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Silhouettes that are asked, at most: those of more views are thinned evenly.
 const MOST_CARVERS: usize = 32;
+
+/// Pixels of all of them, at most: a silhouette takes four bytes a pixel.
+const MOST_CARVER_PIXELS: usize = 64_000_000;
 
 /// Rays per view, and of all views: a share of 1 % is told from none.
 const MOST_RAYS_PER_VIEW: usize = 400;
@@ -48,7 +52,8 @@ pub(super) fn measure(views: &[View], geometry: Option<&Geometry>) -> Option<Coh
         return None;
     }
     let (middle, radius) = ball(views)?;
-    let every = views.len().div_ceil(MOST_CARVERS);
+    let pixels = views.iter().map(|view| view.image.pixels().len()).max().unwrap_or(1);
+    let every = views.len().div_ceil((MOST_CARVER_PIXELS / pixels).clamp(2, MOST_CARVERS));
     let carver = |(index, view): (usize, &View)| Carver {
         index,
         silhouette: Silhouette::new(view),
@@ -63,7 +68,8 @@ pub(super) fn measure(views: &[View], geometry: Option<&Geometry>) -> Option<Coh
         .enumerate()
         .map(|(i, view)| {
             let depth = geometry.map(|geometry| geometry.depths[i].depth());
-            let along = |pixel: usize| Ray::new(view, i, pixel, depth, &carvers, middle.as_vec3(), radius as f32);
+            let along =
+                |pixel: usize| Ray::new(view, i, pixel, depth, &carvers, middle.as_vec3(), radius as f32);
             thinned(view, most).map(along).collect()
         })
         .collect();
@@ -88,8 +94,8 @@ pub(super) fn measure(views: &[View], geometry: Option<&Geometry>) -> Option<Coh
     };
     let mut scales: Vec<f64> = all().filter_map(|ray| ray.scale).collect();
     let middle_of = scales.len() / 2;
-    let depth_scale = (scales.len() >= LEAST_DEPTHS)
-        .then(|| *scales.select_nth_unstable_by(middle_of, f64::total_cmp).1);
+    let depth_scale =
+        (scales.len() >= LEAST_DEPTHS).then(|| *scales.select_nth_unstable_by(middle_of, f64::total_cmp).1);
     Some(Coherence { views: (0..views.len()).map(of_view).collect(), depth_scale })
 }
 
@@ -124,13 +130,9 @@ fn reach(view: &View, middle: DVec3) -> f64 {
 
 /// Some of the mask's pixels, spread evenly.
 fn thinned(view: &View, most: usize) -> impl Iterator<Item = usize> {
-    let mask = view.mask.as_ref().expect("looked at before");
-    let width = mask.width() as usize;
-    let pixels: Vec<usize> = (0..mask.labels().len())
-        .filter(|i| mask.is_vehicle((i % width) as u32, (i / width) as u32))
-        .collect();
-    let n = pixels.len().min(most);
-    (0..n).map(move |k| pixels[k * pixels.len() / n])
+    let labels = view.mask.as_ref().expect("looked at before").labels();
+    let pixels = move || (0..labels.len()).filter(|&pixel| labels[pixel] == Label::Vehicle);
+    pixels().step_by(pixels().count().div_ceil(most).max(1))
 }
 
 /// A silhouette that others are held against.

@@ -28,7 +28,7 @@ pub struct Evidence {
 /// The numbers of one view. Shares are 0 to 1.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ViewEvidence {
-    /// The view's name.
+    /// The view's name, or its place among those used where it has none.
     pub name: String,
     /// Pixels of the picture.
     pub pixels: f64,
@@ -85,11 +85,19 @@ pub(in crate::pipeline) fn compare(examined: &Examined, context: &Context) -> Ev
 
 /// Looks at each view alone.
 pub(in crate::pipeline) fn glance(examined: &Examined) -> Evidence {
-    let of_used = |used: &View| {
-        let given = examined.given.iter().find(|view| view.name == used.name);
+    let all_used = examined.given.len() == examined.used.len();
+    let of_used = |(i, used): (usize, &View)| {
+        // Views that show nothing at the working resolution are given and not used.
+        let given = match all_used {
+            true => examined.given.get(i),
+            false => examined.given.iter().find(|view| view.name == used.name),
+        };
         let mask = given.and_then(|view| view.mask.as_ref());
         ViewEvidence {
-            name: used.name.clone(),
+            name: match used.name.as_str() {
+                "" => format!("{} of those used", i + 1),
+                name => name.to_owned(),
+            },
             pixels: used.image.pixels().len() as f64,
             mask_share: mask.map_or(1.0, |m| m.vehicle_pixels() as f64 / m.labels().len() as f64),
             border_share: mask.map_or(1.0, border_share),
@@ -97,7 +105,7 @@ pub(in crate::pipeline) fn glance(examined: &Examined) -> Evidence {
             ..ViewEvidence::default()
         }
     };
-    Evidence { views: examined.used.iter().map(of_used).collect(), ..Evidence::default() }
+    Evidence { views: examined.used.iter().enumerate().map(of_used).collect(), ..Evidence::default() }
 }
 
 fn border_share(mask: &Mask) -> f64 {
@@ -116,16 +124,17 @@ fn without_ray(view: &View) -> f64 {
         return 0.0;
     }
     let labels = view.mask.as_ref().map(Mask::labels);
-    let pixels = view.image.pixels().len();
-    let vehicle: Vec<usize> =
-        (0..pixels).filter(|&i| labels.is_none_or(|labels| labels[i] == Label::Vehicle)).collect();
-    let asked: Vec<usize> = vehicle.iter().copied().step_by((vehicle.len() / ASKED).max(1)).collect();
+    let is_vehicle = |pixel: &usize| labels.is_none_or(|labels| labels[*pixel] == Label::Vehicle);
+    let vehicle = || (0..view.image.pixels().len()).filter(is_vehicle);
+    let every = (vehicle().count() / ASKED).max(1);
+    let (mut asked, mut lost) = (0usize, 0usize);
     let width = view.camera.width as usize;
-    let has_ray = |&i: &usize| {
-        view.camera.ray([(i % width) as f64 + 0.5, (i / width) as f64 + 0.5]).is_some()
-    };
-    let lost = asked.iter().filter(|i| !has_ray(i)).count();
-    lost as f64 / asked.len().max(1) as f64
+    for pixel in vehicle().step_by(every) {
+        let at = [(pixel % width) as f64 + 0.5, (pixel / width) as f64 + 0.5];
+        asked += 1;
+        lost += usize::from(view.camera.ray(at).is_none());
+    }
+    lost as f64 / asked.max(1) as f64
 }
 
 impl Evidence {

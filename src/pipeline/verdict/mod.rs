@@ -18,9 +18,11 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// Nothing that was examined looks wrong.
+    /// Nothing looks wrong.
     #[default]
     Good,
+    /// Nothing looks wrong, but the check was switched off: views were not compared with one another.
+    Unchecked,
     /// Something looks wrong; the model may still be of use.
     Doubtful,
     /// The input contradicts itself, or describes no road vehicle.
@@ -105,10 +107,11 @@ impl fmt::Display for Reason {
     }
 }
 
-/// The weight of the heaviest reason.
-pub(super) fn verdict(reasons: &[Reason]) -> Verdict {
+/// The weight of the heaviest reason; without one, whether there was a check.
+pub(super) fn verdict(reasons: &[Reason], was_checked: bool) -> Verdict {
     match reasons.iter().map(|reason| reason.severity).max() {
-        None => Verdict::Good,
+        None if was_checked => Verdict::Good,
+        None => Verdict::Unchecked,
         Some(Severity::Doubtful) => Verdict::Doubtful,
         Some(Severity::Bad) => Verdict::Bad,
     }

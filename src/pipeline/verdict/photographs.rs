@@ -21,7 +21,8 @@ pub(super) fn agreement(views: &[View], geometry: &Geometry) -> Vec<Option<f64>>
     let observers = geometry.observers(views);
     let brightness = |color: Vec3| f64::from(color.dot(Vec3::splat(1.0 / 3.0)));
     let pair = |places: &[(Vec3, f64)], other: usize| {
-        let seen = places.iter().filter(|(place, _)| observers[other].sight(*place, SURFACE_M) == Sight::Surface);
+        let seen =
+            places.iter().filter(|(place, _)| observers[other].sight(*place, SURFACE_M) == Sight::Surface);
         let both: Vec<[f64; 2]> =
             seen.map(|(place, own)| [*own, brightness(observers[other].color_at(*place))]).collect();
         (both.len() >= LEAST_SHARED).then(|| correlation(&both))
@@ -29,14 +30,11 @@ pub(super) fn agreement(views: &[View], geometry: &Geometry) -> Vec<Option<f64>>
     let of_view = |i: usize| {
         let (view, depth) = (&views[i], geometry.depths[i].depth());
         let width = view.camera.width as usize;
-        let with_depth: Vec<usize> = (0..depth.len())
-            .filter(|&pixel| depth[pixel] > 0.0 && is_vehicle(view, pixel))
-            .collect();
-        let every = with_depth.len().div_ceil(MOST_PER_VIEW).max(1);
-        let places: Vec<(Vec3, f64)> = with_depth
-            .iter()
+        let with_depth = || (0..depth.len()).filter(|&pixel| depth[pixel] > 0.0 && is_vehicle(view, pixel));
+        let every = with_depth().count().div_ceil(MOST_PER_VIEW).max(1);
+        let places: Vec<(Vec3, f64)> = with_depth()
             .step_by(every)
-            .map(|&pixel| {
+            .map(|pixel| {
                 let place = view.lift((pixel % width) as u32, (pixel / width) as u32, depth[pixel]);
                 (place, brightness(observers[i].color_at(place)))
             })
@@ -58,7 +56,8 @@ fn correlation(pairs: &[[f64; 2]]) -> f64 {
     let n = pairs.len() as f64;
     let mean = |k: usize| pairs.iter().map(|p| p[k]).sum::<f64>() / n;
     let means = [mean(0), mean(1)];
-    let product = |a: usize, b: usize| pairs.iter().map(|p| (p[a] - means[a]) * (p[b] - means[b])).sum::<f64>();
+    let product =
+        |a: usize, b: usize| pairs.iter().map(|p| (p[a] - means[a]) * (p[b] - means[b])).sum::<f64>();
     let spread = (product(0, 0) * product(1, 1)).sqrt();
     if spread > 0.0 { product(0, 1) / spread } else { 0.0 }
 }

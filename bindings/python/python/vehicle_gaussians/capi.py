@@ -118,7 +118,7 @@ class Calibration(enum.IntEnum):
 class Verdict(enum.IntEnum):
     """vg_verdict"""
 
-    GOOD, DOUBTFUL, BAD = range(3)
+    GOOD, UNCHECKED, DOUBTFUL, BAD = range(4)
 
 
 class Backend(enum.IntEnum):

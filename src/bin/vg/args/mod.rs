@@ -77,7 +77,7 @@ pub(crate) struct DepthArgs {
 /// What becomes of a result that is not to be believed.
 #[derive(Args)]
 pub(crate) struct StrictArgs {
-    /// Fail and write nothing where the verdict is not good; with =bad, where it is bad
+    /// Fail and write nothing where the verdict is not good; with =bad, only where it is bad
     #[arg(
         long,
         value_name = "doubtful|bad",
@@ -92,7 +92,7 @@ pub(crate) struct StrictArgs {
 /// From which verdict on a job fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Strict {
-    /// Doubtful and bad.
+    /// Doubtful and bad, and unchecked for a budget.
     Doubtful,
     /// Bad alone.
     Bad,
@@ -120,7 +120,7 @@ pub(crate) struct ReconstructArgs {
     #[arg(long, value_name = "P.ply", conflicts_with = "baseline")]
     pub(crate) points: Option<PathBuf>,
     /// Do not draw the model into the input views to report the error there: about twice as fast with given depth
-    #[arg(long)]
+    #[arg(long, conflicts_with = "strict")]
     pub(crate) no_check: bool,
     #[command(flatten)]
     pub(crate) strict: StrictArgs,

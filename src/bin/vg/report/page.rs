@@ -321,7 +321,9 @@ fn checked(out: &mut String, views: &[CheckedView]) -> fmt::Result {
     if views.is_empty() {
         return Ok(());
     }
-    out.push_str("<h3>The check of each input, by the camera that was used, and by the camera as given</h3>\n");
+    out.push_str(
+        "<h3>The check of each input, by the camera that was used, and by the camera as given</h3>\n",
+    );
     out.push_str("<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">view</th>");
     for name in ["PSNR, dB", "as given", "silhouette IoU", "as given", "mask covered, %", "as given"] {
         write!(out, "<th scope=\"col\">{name}</th>")?;
