@@ -1132,6 +1132,10 @@ class Report {
     /// The whole report. Lives as long as the report.
     const char *json() const noexcept { return vg_report_json(handle_.get()); }
 
+    /// Why `figures().verdict` is not `VG_VERDICT_GOOD`, one line; `index` below `figures().reason_count`. Lives as long as
+    /// the report.
+    const char *reason(std::size_t index) const noexcept { return vg_report_reason(handle_.get(), index); }
+
     /// Positions of the metric point cloud, metres; none unless `options.points` was 1. `[count][3]`
     Span<const float> point_positions() const noexcept {
         return {vg_report_point_positions(handle_.get()), 3 * vg_report_point_count(handle_.get())};

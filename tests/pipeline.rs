@@ -2,9 +2,9 @@
 
 mod common;
 
-use common::vehicle::{camera, right_side, view, without_depth};
+use common::vehicle::{HALF, camera, right_side, view, without_depth};
 use std::ops::ControlFlow;
-use vg::pipeline::{Keep, Options, PriorChoice, Reconstruction, reconstruct};
+use vg::pipeline::{Keep, Options, PriorChoice, Reason, ReasonCode, Reconstruction, Verdict, reconstruct};
 use vg::relight::Relight;
 use vg::render::{Background, CpuRenderer, RenderOptions, Renderer};
 use vg::scene::mask::Label;
@@ -94,6 +94,204 @@ fn the_check_can_be_left_out() {
 }
 
 #[test]
+fn the_error_by_the_given_cameras_is_that_of_the_cameras_as_they_came() {
+    // The plane of symmetry is 2 degrees and 5 cm off: the calibration finds it, and each camera by itself.
+    let mut scene = without_depth(right_side(160, 120));
+    let turn = glam::DMat3::from_rotation_z(2f64.to_radians());
+    for view in &mut scene.views {
+        let pose = &mut view.camera.vehicle_from_camera;
+        *pose = vg::geometry::Pose { rotation: turn, translation: glam::DVec3::Y * 0.05 }.after(pose);
+    }
+    // One camera is turned by a degree, which its silhouette contradicts.
+    let pose = &mut scene.views[1].camera.vehicle_from_camera;
+    pose.rotation *= glam::DMat3::from_rotation_x(1f64.to_radians());
+    let made = run(&scene, &Options { prior: PriorChoice::Hull, ..Options::default() });
+    let report = &made.report;
+    let moved = report.calibration.as_ref().unwrap().views.iter().any(|view| view.pixels > 0.5);
+    assert!(moved, "{:?}", report.calibration);
+
+    let names: Vec<&str> = report.input_views.iter().map(|view| view.name.as_str()).collect();
+    assert_eq!(names, report.views_used);
+    let mut mean = 0.0;
+    for (checked, view) in report.input_views.iter().zip(&scene.views) {
+        let drawn =
+            CpuRenderer::new().render(&made.gaussians, &view.camera, &RenderOptions::default()).unwrap();
+        let given = checked.by_given_camera;
+        assert_eq!(given.psnr_db, metrics::psnr(&drawn.color, &metrics::on_white(view)), "{}", checked.name);
+        assert_eq!(given.silhouette_iou, metrics::silhouette_iou(&drawn.alpha, view));
+        assert_eq!(given.mask_covered, metrics::mask_covered(&drawn.alpha, view));
+        mean += given.silhouette_iou / 4.0;
+    }
+    let (used, given) = (report.input_error.unwrap(), report.input_error_by_given_cameras.unwrap());
+    assert!((given.silhouette_iou - mean).abs() < 1e-12);
+    assert!(used.silhouette_iou > given.silhouette_iou + 0.005, "{used:?} {given:?}");
+}
+
+#[test]
+fn cameras_that_were_not_moved_have_one_error() {
+    let report = run(&right_side(64, 48), &Options::default()).report;
+    assert_eq!(report.input_error, report.input_error_by_given_cameras);
+    assert!(report.input_views.iter().all(|view| view.errors == view.by_given_camera));
+}
+
+fn hull() -> Options {
+    Options { prior: PriorChoice::Hull, ..Options::default() }
+}
+
+/// The verdict on the scene, which is not good, and its reason of this kind.
+fn reason(scene: &Scene, options: &Options, code: ReasonCode) -> (Verdict, Reason) {
+    let report = run(scene, options).report;
+    assert!(report.verdict > Verdict::Good && !report.verdict_reasons.is_empty());
+    let found = report.verdict_reasons.iter().find(|reason| reason.code == code);
+    (report.verdict, found.unwrap_or_else(|| panic!("{:#?}", report.verdict_reasons)).clone())
+}
+
+fn inverted(mask: &Mask) -> Mask {
+    let other = |label: &Label| if *label == Label::Vehicle { Label::Background } else { Label::Vehicle };
+    Mask::new(mask.width(), mask.height(), mask.labels().iter().map(other).collect()).unwrap()
+}
+
+fn move_all(scene: &mut Scene, by: &vg::geometry::Pose) {
+    for view in &mut scene.views {
+        view.camera.vehicle_from_camera = by.after(&view.camera.vehicle_from_camera);
+    }
+}
+
+fn shift(x: f64, y: f64, z: f64) -> vg::geometry::Pose {
+    vg::geometry::Pose { rotation: glam::DMat3::IDENTITY, translation: glam::DVec3::new(x, y, z) }
+}
+
+#[test]
+fn a_scene_that_agrees_with_itself_is_good_with_depth_and_without_and_with_one_view() {
+    let scene = right_side(160, 120);
+    let one = Scene { views: scene.views[1..2].to_vec(), cloud: None };
+    for (scene, options) in [
+        (scene.clone(), Options::default()),
+        (without_depth(scene.clone()), Options::default()),
+        (without_depth(scene), hull()),
+        (one.clone(), Options { symmetry: SymmetryMode::Never, ..Options::default() }),
+        (without_depth(one), Options::default()),
+    ] {
+        let report = run(&scene, &options).report;
+        assert_eq!((report.verdict, &report.verdict_reasons), (Verdict::Good, &Vec::new()));
+    }
+}
+
+#[test]
+fn without_the_check_nothing_is_called_good_and_a_wrong_size_is_still_bad() {
+    let quick = Options { check: false, ..hull() };
+    let mut scene = without_depth(right_side(160, 120));
+    let report = run(&scene, &quick).report;
+    assert_eq!((report.verdict, report.verdict_reasons.len()), (Verdict::Unchecked, 0));
+    scene.views.iter_mut().for_each(|v| v.camera.vehicle_from_camera.translation *= 0.18);
+    assert_eq!(reason(&scene, &quick, ReasonCode::TooSmall).0, Verdict::Bad);
+}
+
+#[test]
+fn the_inverted_mask_is_named_and_it_is_the_view_that_disagrees() {
+    let mut scene = without_depth(right_side(160, 120));
+    scene.views[1].mask = scene.views[1].mask.as_ref().map(inverted);
+    let (verdict, found) = reason(&scene, &hull(), ReasonCode::MaskInverted);
+    assert_eq!((verdict, found.view.as_deref()), (Verdict::Bad, Some("-75")));
+    let (_, found) = reason(&scene, &hull(), ReasonCode::ViewDisagrees);
+    assert_eq!(found.view.as_deref(), Some("-75"));
+    assert!(found.to_string().starts_with("view -75: ") && !found.to_string().contains('\n'), "{found}");
+}
+
+#[test]
+fn masks_of_the_next_frame_are_bad() {
+    let mut scene = without_depth(right_side(160, 120));
+    let masks: Vec<_> = scene.views.iter().map(|view| view.mask.clone()).collect();
+    for (i, view) in scene.views.iter_mut().enumerate() {
+        view.mask.clone_from(&masks[(i + 1) % 4]);
+    }
+    assert_eq!(run(&scene, &hull()).report.verdict, Verdict::Bad);
+}
+
+#[test]
+fn photographs_of_the_next_frame_disagree_though_all_silhouettes_agree() {
+    let scene = right_side(160, 120);
+    let mut shifted = scene.clone();
+    for i in 0..4 {
+        shifted.views[i].image = scene.views[(i + 1) % 4].image.clone();
+    }
+    let (_, found) = reason(&shifted, &Options::default(), ReasonCode::Photographs);
+    assert!(found.cause.contains("another order"), "{found}");
+    let report = run(&shifted, &Options::default()).report;
+    assert!(report.verdict_reasons.iter().all(|r| r.code != ReasonCode::ViewsDisagree));
+}
+
+#[test]
+fn sizes_that_no_road_vehicle_has_are_bad_below_and_above() {
+    for scale in [0.02, 0.18] {
+        let mut small = without_depth(right_side(160, 120));
+        small.views.iter_mut().for_each(|v| v.camera.vehicle_from_camera.translation *= scale);
+        let (verdict, found) = reason(&small, &hull(), ReasonCode::TooSmall);
+        assert_eq!(verdict, Verdict::Bad);
+        assert!(found.expected.contains("2.2 x 1.1 x 0.95 m"), "{found}");
+    }
+    // The depth keeps up with the poses: nothing but the size is wrong.
+    let mut large = right_side(160, 120);
+    for view in &mut large.views {
+        view.camera.vehicle_from_camera.translation *= 6.0;
+        let depth = view.depth.as_ref().unwrap().depth().iter().map(|z| 6.0 * z).collect();
+        view.depth = Some(DepthMap::new(160, 120, depth).unwrap());
+    }
+    let (verdict, found) = reason(&large, &Options::default(), ReasonCode::TooLarge);
+    assert_eq!(verdict, Verdict::Bad);
+    assert!(found.found.contains(&format!("{:.0}.", 12.0 * HALF.x)), "{found}");
+}
+
+#[test]
+fn a_frame_far_away_is_told_from_a_wrong_size() {
+    let mut utm = right_side(160, 120);
+    move_all(&mut utm, &shift(4.5e5, 5.4e6, 0.0));
+    let (verdict, found) = reason(&utm, &Options::default(), ReasonCode::FarAway);
+    assert_eq!(verdict, Verdict::Bad);
+    assert!(found.cause.contains("UTM") && found.remedy.contains("vehicle_from_world"), "{found}");
+}
+
+#[test]
+fn a_plane_beside_the_vehicle_is_a_matter_of_symmetry() {
+    let mut scene = without_depth(right_side(160, 120));
+    move_all(&mut scene, &shift(0.0, 1.0, 0.0));
+    let (verdict, found) = reason(&scene, &hull(), ReasonCode::Symmetry);
+    assert_eq!(verdict, Verdict::Bad);
+    assert!(found.cause.contains("plane of symmetry"), "{found}");
+    reason(&scene, &hull(), ReasonCode::CalibrationRefused);
+}
+
+#[test]
+fn depth_of_another_unit_or_another_frame_is_told_from_the_silhouettes() {
+    let scene = right_side(160, 120);
+    for (factor, unit) in [(1000.0, "millimetres"), (3.281, "feet")] {
+        let mut wrong = scene.clone();
+        for view in &mut wrong.views {
+            let depth = view.depth.as_ref().unwrap().depth().iter().map(|z| factor * z).collect();
+            view.depth = Some(DepthMap::new(160, 120, depth).unwrap());
+        }
+        let (verdict, found) = reason(&wrong, &Options::default(), ReasonCode::DepthUnit);
+        assert_eq!(verdict, Verdict::Bad);
+        assert!(found.cause.contains(unit), "{found}");
+    }
+    let mut moved = scene.clone();
+    let further = scene.views[1].depth.as_ref().unwrap().depth().iter();
+    let further = further.map(|z| if *z > 0.0 { z + 2.5 } else { 0.0 }).collect();
+    moved.views[1].depth = Some(DepthMap::new(160, 120, further).unwrap());
+    let (verdict, found) = reason(&moved, &Options::default(), ReasonCode::DepthOutside);
+    assert_eq!((verdict, found.view.as_deref()), (Verdict::Bad, Some("-75")));
+}
+
+#[test]
+fn a_lens_that_has_folded_before_the_vehicle_is_bad_and_named() {
+    let mut scene = without_depth(right_side(160, 120));
+    scene.views[2].camera.distortion =
+        vg::geometry::Distortion::Brown { k: [-44.8, 0.0, 0.0, 0.0, 0.0, 0.0], p: [0.0; 2] };
+    let (verdict, found) = reason(&scene, &hull(), ReasonCode::Lens);
+    assert_eq!((verdict, found.view.as_deref()), (Verdict::Bad, Some("-105")));
+}
+
+#[test]
 fn every_stage_can_be_cancelled_and_says_which_it_was() {
     let scene = without_depth(right_side(160, 120));
     let mut stages: Vec<&'static str> = Vec::new();
@@ -146,6 +344,11 @@ fn the_report_is_json_with_the_promised_keys() {
         "prior",
         "head",
         "box",
+        "input_error_by_given_cameras",
+        "input_views",
+        "verdict",
+        "verdict_reasons",
+        "evidence",
     ] {
         assert!(!json[key].is_null(), "{key}");
     }

@@ -74,6 +74,9 @@ unsafe fn run(
 
 unsafe fn log(log: Log, report: &Report) {
     unsafe {
+        for reason in &report.verdict_reasons {
+            log.line(vg_log_level::Warning, || reason.to_string());
+        }
         let of_network = report.network.iter().flat_map(|network| &network.warnings);
         for warning in report.warnings.iter().chain(of_network) {
             log.line(vg_log_level::Warning, || warning.clone());

@@ -3,9 +3,9 @@
 use super::guard::{free, guarded, guarded_value};
 use super::options::vg_prior;
 use super::read::{self, Versioned};
-use super::status::{c_string, vg_error, vg_status};
+use super::status::{c_string, one_line, vg_error, vg_status};
 use crate::calibrate::Verdict;
-use crate::pipeline::{PointCloud, Report};
+use crate::pipeline::{self, PointCloud, Report};
 use std::ffi::{CString, c_char};
 
 /// What a reconstruction did, how long it took, what it left out, and the error it can know. Owned by the caller,
@@ -18,6 +18,8 @@ pub struct vg_report {
 pub(super) struct ReportObject {
     report: Report,
     json: CString,
+    /// A line each.
+    reasons: Vec<CString>,
     points: PointCloud,
 }
 
@@ -25,9 +27,10 @@ impl ReportObject {
     pub(super) fn new(mut report: Report, points: Option<PointCloud>) -> Self {
         let json = serde_json::to_string_pretty(&report)
             .unwrap_or_else(|e| format!("{{\"error\": {:?}}}", e.to_string()));
+        let reasons = report.verdict_reasons.iter().map(|r| c_string(one_line(&r.to_string()))).collect();
         // The text has their paths; a report that is kept must not keep a network's memory.
         (report.settings.prior_model, report.settings.head_model) = (None, None);
-        Self { report, json: c_string(json), points: points.unwrap_or_default() }
+        Self { report, json: c_string(json), reasons, points: points.unwrap_or_default() }
     }
 
     pub(super) fn into_raw(self) -> *mut vg_report {
@@ -53,6 +56,20 @@ pub enum vg_calibration {
     Refused = 3,
 }
 
+/// Whether a reconstruction is to be believed.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum vg_verdict {
+    /// Nothing looks wrong.
+    Good = 0,
+    /// Nothing looks wrong, but `vg_options.check` was 0: views were not compared with one another.
+    Unchecked = 1,
+    /// Something looks wrong; the model may still be of use.
+    Doubtful = 2,
+    /// The input contradicts itself, or describes no road vehicle.
+    Bad = 3,
+}
+
 /// The main figures of a report.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
@@ -76,11 +93,11 @@ pub struct vg_report_figures {
     pub total_ms: f64,
     /// Highest resident memory of the process so far, bytes; 0 where the system does not tell.
     pub peak_rss_bytes: u64,
-    /// 1 if the three fields that follow hold the error on the input views, 0 if the check was switched off.
+    /// 1 if the `input_` fields hold the error on the input views, 0 if the check was switched off.
     pub has_input_error: i32,
     /// 1 if the prior looked for the vehicle in a box whose size follows below.
     pub has_box: i32,
-    /// Mean PSNR over the used views, on white, full frame, dB.
+    /// Mean PSNR over the used views, drawn by the cameras that were used, on white, full frame, dB.
     pub input_psnr_db: f64,
     /// Mean intersection over union of the model's silhouette and the masks.
     pub input_silhouette_iou: f64,
@@ -123,6 +140,18 @@ pub struct vg_report_figures {
     pub has_vehicle_size: i32,
     /// 1 if `vg_options.budget_s` was kept, or there was none; 0 if the call took longer.
     pub budget_kept: i32,
+    /// The least part of a view's mask that is drawn, 0 to 1, by the cameras that were used.
+    pub input_mask_covered: f64,
+    /// `input_psnr_db` as drawn by the caller's own cameras: it differs where the calibration moved them.
+    pub input_given_psnr_db: f64,
+    /// `input_silhouette_iou` as drawn by the caller's own cameras.
+    pub input_given_silhouette_iou: f64,
+    /// `input_mask_covered` as drawn by the caller's own cameras.
+    pub input_given_mask_covered: f64,
+    /// A `vg_verdict`; `vg_report_reason` tells why it is not good.
+    pub verdict: i32,
+    /// How many reasons there are.
+    pub reason_count: u32,
 }
 
 unsafe impl Versioned for vg_report_figures {
@@ -162,6 +191,12 @@ unsafe impl Versioned for vg_report_figures {
             vehicle_size_uncertainty: [0.0; 3],
             has_vehicle_size: 0,
             budget_kept: 0,
+            input_mask_covered: 0.0,
+            input_given_psnr_db: 0.0,
+            input_given_silhouette_iou: 0.0,
+            input_given_mask_covered: 0.0,
+            verdict: vg_verdict::Good as i32,
+            reason_count: 0,
         }
     }
 }
@@ -181,6 +216,13 @@ impl vg_report_figures {
             Some(Verdict::Accepted) => vg_calibration::Accepted,
             Some(Verdict::Refused) => vg_calibration::Refused,
         };
+        let verdict = match report.verdict {
+            pipeline::Verdict::Good => vg_verdict::Good,
+            pipeline::Verdict::Unchecked => vg_verdict::Unchecked,
+            pipeline::Verdict::Doubtful => vg_verdict::Doubtful,
+            pipeline::Verdict::Bad => vg_verdict::Bad,
+        };
+        let given = report.input_error_by_given_cameras;
         let (low, high) = report.extent_m.unwrap_or_default();
         Self {
             gaussian_count: report.gaussians as u64,
@@ -213,6 +255,12 @@ impl vg_report_figures {
             vehicle_size_uncertainty: report.vehicle.map_or([0.0; 3], |v| v.uncertainty_m),
             has_vehicle_size: i32::from(report.vehicle.is_some()),
             budget_kept: i32::from(report.plan.as_ref().is_none_or(|plan| plan.kept)),
+            input_mask_covered: report.input_error.map_or(0.0, |e| e.mask_covered),
+            input_given_psnr_db: given.map_or(0.0, |e| e.psnr_db),
+            input_given_silhouette_iou: given.map_or(0.0, |e| e.silhouette_iou),
+            input_given_mask_covered: given.map_or(0.0, |e| e.mask_covered),
+            verdict: verdict as i32,
+            reason_count: report.verdict_reasons.len() as u32,
             ..Self::initial()
         }
     }
@@ -247,6 +295,19 @@ pub unsafe extern "C" fn vg_report_get_figures(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn vg_report_json(report: *const vg_report) -> *const c_char {
     guarded_value(c"".as_ptr(), || unsafe { object(report) }.map_or(c"".as_ptr(), |r| r.json.as_ptr()))
+}
+
+/// Why the verdict is not good, the heaviest reason first: one line of UTF-8 that names the view where one is concerned,
+/// what was found, what is expected, the likely cause and the way out. `index`: below `vg_report_figures.reason_count`;
+/// beyond it an empty string. Lives as long as the report; the JSON has the parts, as `verdict_reasons`. NULL: an empty
+/// string. Never NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_report_reason(report: *const vg_report, index: usize) -> *const c_char {
+    guarded_value(c"".as_ptr(), || {
+        unsafe { object(report) }
+            .and_then(|r| r.reasons.get(index))
+            .map_or(c"".as_ptr(), |line| line.as_ptr())
+    })
 }
 
 /// How many points the metric coloured point cloud has; 0 unless `vg_options.points` was 1. NULL: 0.

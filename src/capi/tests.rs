@@ -82,7 +82,8 @@ fn layout_of_rust() -> String {
             has_input_error has_box input_psnr_db input_silhouette_iou box_size extent_low extent_high relit_count
             cloud_used photo_found calibration has_uncovered calibration_yaw_degrees calibration_lateral_m
             uncovered_before uncovered_after refine_iterations refine_kept vehicle_size vehicle_size_uncertainty
-            has_vehicle_size budget_kept
+            has_vehicle_size budget_kept input_mask_covered input_given_psnr_db
+            input_given_silhouette_iou input_given_mask_covered verdict reason_count
         }
         vg_scene_options {
             struct_size context vehicle_from_world names name_count depth_scale load_depth flags log log_user
@@ -140,6 +141,7 @@ fn numbers_of_rust() -> BTreeSet<String> {
         vg_relight { Auto Never }
         vg_status { Ok Argument Format Io Reconstruction Cancelled NotBuilt Internal Missing }
         vg_symmetry { Auto Always Never Flip }
+        vg_verdict { Good Unchecked Doubtful Bad }
     }
     lines
 }
@@ -284,6 +286,7 @@ fn every_function() -> Vec<(&'static str, Call)> {
         vg_report_figures_init(null_mut(), 0) status;
         vg_report_get_figures(null(), null_mut()) reports;
         vg_report_json(null()) text;
+        vg_report_reason(null(), 0) text;
         vg_report_point_count(null()) value;
         vg_report_point_positions(null()) value;
         vg_report_point_colors(null()) value;

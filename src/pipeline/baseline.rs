@@ -1,9 +1,10 @@
 //! The run of the baseline: plan -> undistort -> start -> refine -> check. Cameras are taken as they are.
 
-use super::check::input_error;
+use super::check::checked;
 use super::options::Options;
-use super::report::{Clock, Report, peak_rss_bytes};
+use super::report::{Clock, InputError, Report, peak_rss_bytes};
 use super::run::{Reconstruction, chosen_views, undistorted};
+use super::verdict::{self, Examined, Judged};
 use super::{budget, cost, plan};
 use crate::error::Result;
 use crate::prior::volume::KnownBox;
@@ -42,10 +43,20 @@ pub(super) fn reconstruct(
     let (gaussians, refinement) = baseline::fit(&gaussians, &views, how, context)?;
     clock.lap("refine");
 
-    let input_error = match options.check {
-        true => Some(input_error(&gaussians, &views, context)?),
-        false => None,
+    let originals: Vec<_> = used.iter().map(|&i| &scene.views[i]).collect();
+    let examined = Examined { given: &originals, used: &views, geometry: None };
+    let (evidence, input_views) = match options.check {
+        true => (verdict::compare(&examined, context), checked(&gaussians, &views, &views, context)?),
+        false => (verdict::glance(&examined), Vec::new()),
     };
+    let evidence = evidence.with_model(&gaussians, &views);
+    let reasons = verdict::judge(&Judged {
+        evidence: &evidence,
+        checked: &input_views,
+        calibration: None,
+        has_depth: true,
+        is_completed: false,
+    });
     clock.lap("check");
 
     let cameras: Vec<_> = views.iter().map(|v| v.camera).collect();
@@ -77,7 +88,12 @@ pub(super) fn reconstruct(
         symmetry: completion,
         relight: None,
         refinement: Some(refinement),
-        input_error,
+        input_error: InputError::over(input_views.iter().map(|view| view.errors)),
+        input_error_by_given_cameras: InputError::over(input_views.iter().map(|view| view.by_given_camera)),
+        input_views,
+        verdict: verdict::verdict(&reasons, options.check),
+        verdict_reasons: reasons,
+        evidence,
         settings: options.clone(),
     };
     context.report_end()?;

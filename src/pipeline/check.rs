@@ -1,6 +1,6 @@
 //! The error that a reconstruction can know: that of its pictures of what it was made from.
 
-use super::report::InputError;
+use super::report::{CheckedView, InputError};
 use crate::error::Result;
 use crate::gaussians::Gaussians;
 use crate::metrics;
@@ -8,17 +8,30 @@ use crate::progress::Context;
 use crate::render::{CpuRenderer, RenderOptions, Renderer};
 use crate::scene::View;
 
-/// The model drawn into the views it came from.
-pub(super) fn input_error(gaussians: &Gaussians, views: &[View], context: &Context) -> Result<InputError> {
+/// The model drawn into the views it came from: by the cameras that were used, and by those that the caller gave.
+/// `used` and `given` differ in their cameras' poses alone.
+pub(super) fn checked(
+    gaussians: &Gaussians,
+    used: &[View],
+    given: &[View],
+    context: &Context,
+) -> Result<Vec<CheckedView>> {
     let renderer = CpuRenderer::new();
-    let mut error = InputError { psnr_db: 0.0, silhouette_iou: 0.0, mask_covered: 1.0 };
-    for (i, view) in views.iter().enumerate() {
-        context.report("check", i as f64 / views.len() as f64)?;
-        let rendered =
+    let error = |view: &View| -> Result<InputError> {
+        let drawn =
             context.parallel(|| renderer.render(gaussians, &view.camera, &RenderOptions::default()))?;
-        error.psnr_db += metrics::psnr(&rendered.color, &metrics::on_white(view)) / views.len() as f64;
-        error.silhouette_iou += metrics::silhouette_iou(&rendered.alpha, view) / views.len() as f64;
-        error.mask_covered = error.mask_covered.min(metrics::mask_covered(&rendered.alpha, view));
-    }
-    Ok(error)
+        Ok(InputError {
+            psnr_db: metrics::psnr(&drawn.color, &metrics::on_white(view)),
+            silhouette_iou: metrics::silhouette_iou(&drawn.alpha, view),
+            mask_covered: metrics::mask_covered(&drawn.alpha, view),
+        })
+    };
+    let n = used.len() as f64;
+    let one = |(i, (used, given)): (usize, (&View, &View))| {
+        context.report("check", i as f64 / n)?;
+        let errors = error(used)?;
+        let by_given_camera = if given.camera == used.camera { errors } else { error(given)? };
+        Ok(CheckedView { name: used.name.clone(), errors, by_given_camera })
+    };
+    used.iter().zip(given).enumerate().map(one).collect()
 }

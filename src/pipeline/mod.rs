@@ -13,10 +13,12 @@ pub mod report;
 pub mod run;
 mod size;
 mod spread;
+pub mod verdict;
 
 pub use budget::{BudgetPlan, Chosen};
 pub use machine::Machine;
 pub use options::{Calibrate, Keep, Options, PriorChoice};
-pub use report::{InputError, LeftOut, Report, Stage};
+pub use report::{CheckedView, InputError, LeftOut, Report, Stage};
 pub use run::{PointCloud, Reconstruction, reconstruct, reconstruct_on};
 pub use size::VehicleSize;
+pub use verdict::{Evidence, Reason, ReasonCode, Severity, Verdict, ViewEvidence};

@@ -3,6 +3,7 @@
 use super::budget::BudgetPlan;
 use super::options::Options;
 use super::size::VehicleSize;
+use super::verdict::{Evidence, Reason, Verdict};
 use crate::calibrate::Calibration;
 use crate::prior::{BoxSource, Filled, NetworkFit, PhotoFit, PointFit, WorkingBox};
 use crate::refine::Refinement;
@@ -32,15 +33,41 @@ pub struct LeftOut {
     pub count: usize,
 }
 
-/// The model rendered back into the input views, against the masked photographs on white.
+/// The model rendered back into input views, against the masked photographs on white.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct InputError {
-    /// Mean over the used views, full frame, dB.
+    /// Full frame, dB; mean over the views.
     pub psnr_db: f64,
-    /// Mean over the used views: alpha >= 0.5 against the mask.
+    /// Alpha >= 0.5 against the mask; mean over the views.
     pub silhouette_iou: f64,
-    /// The least over the used views: the part of the mask that is drawn with alpha >= 0.5, 0 to 1.
+    /// The part of the mask that is drawn with alpha >= 0.5, 0 to 1; the least of the views.
     pub mask_covered: f64,
+}
+
+impl InputError {
+    /// Over several views; `None` without any.
+    pub(super) fn over(errors: impl ExactSizeIterator<Item = Self>) -> Option<Self> {
+        let n = errors.len();
+        let start = Self { psnr_db: 0.0, silhouette_iou: 0.0, mask_covered: 1.0 };
+        let over = errors.fold(start, |over, one| Self {
+            psnr_db: over.psnr_db + one.psnr_db / n as f64,
+            silhouette_iou: over.silhouette_iou + one.silhouette_iou / n as f64,
+            mask_covered: over.mask_covered.min(one.mask_covered),
+        });
+        (n > 0).then_some(over)
+    }
+}
+
+/// The model rendered back into one input view.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CheckedView {
+    /// The view's name.
+    pub name: String,
+    /// Drawn by the camera that was used: the calibration's, where it moved the camera.
+    #[serde(flatten)]
+    pub errors: InputError,
+    /// Drawn by the caller's own camera.
+    pub by_given_camera: InputError,
 }
 
 /// The box the prior looked for the vehicle in.
@@ -114,8 +141,18 @@ pub struct Report {
     pub relight: Option<Relighting>,
     /// What the optimisation did, where it was asked for.
     pub refinement: Option<Refinement>,
-    /// Error on the input views, unless the check was switched off.
+    /// Error on the input views, drawn by the cameras that were used, unless the check was switched off.
     pub input_error: Option<InputError>,
+    /// The same, drawn by the caller's own cameras; it differs where the calibration moved them.
+    pub input_error_by_given_cameras: Option<InputError>,
+    /// The errors of each used view, in the order of `views_used`; empty if the check was switched off.
+    pub input_views: Vec<CheckedView>,
+    /// Whether the model is to be believed.
+    pub verdict: Verdict,
+    /// Why the verdict is not good, the heaviest reason first.
+    pub verdict_reasons: Vec<Reason>,
+    /// The numbers that the verdict rests on.
+    pub evidence: Evidence,
     /// The options of the call; where it had a budget, those that were chosen: with them and without a budget another
     /// call does the same.
     pub settings: Options,

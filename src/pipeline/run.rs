@@ -1,12 +1,13 @@
 //! The run: plan -> undistort -> calibrate -> prior -> pixels -> head -> symmetry -> check.
 
 use super::budget::{self, BudgetPlan};
-use super::check::input_error;
+use super::check::checked;
 use super::options::{Calibrate, Options, PriorChoice};
 use super::pixels::{self, BETTER};
-use super::report::{Clock, LeftOut, Report, peak_rss_bytes};
+use super::report::{Clock, InputError, LeftOut, Report, peak_rss_bytes};
 use super::size::VehicleSize;
 use super::spread::spread;
+use super::verdict::{self, Examined, Judged};
 use super::{baseline, cost, measured, plan};
 use crate::calibrate::{self, Calibrated, Moved};
 use crate::error::{Error, Result};
@@ -92,13 +93,13 @@ pub fn reconstruct_on<'a>(
     clock.lap("plan");
 
     context.report("undistort", 0.0)?;
-    let views = undistorted(scene, &used, options, &mut left_out, &context)?;
+    let given = undistorted(scene, &used, options, &mut left_out, &context)?;
     let known_box = options.vehicle_box(scene);
     // A box that stands beside y = 0 brings its own plane of symmetry along.
     let beside = known_box.and_then(|known| known.place).filter(|place| !place.is_on_the_plane());
     let (views, vehicle_from_box) = match beside {
-        Some(place) => (in_frame_of_box(views, &place), Some(place.vehicle_from_box())),
-        None => (views, None),
+        Some(place) => (in_frame_of_box(given.clone(), &place), Some(place.vehicle_from_box())),
+        None => (given.clone(), None),
     };
     clock.lap("undistort");
 
@@ -187,15 +188,29 @@ pub fn reconstruct_on<'a>(
     };
     clock.lap("refine");
     let vehicle = VehicleSize::measured(&gaussians, &geometry);
+
+    let originals: Vec<&View> = used.iter().map(|&i| &scene.views[i]).collect();
+    let examined = Examined { given: &originals, used: &seen, geometry: Some(&geometry) };
+    let evidence = match options.check {
+        true => verdict::compare(&examined, &context),
+        false => verdict::glance(&examined),
+    };
     let (gaussians, points, views) = match &moved {
         Some(moved) => back_in_vehicle(&gaussians, points, moved, &context)?,
         None => (gaussians, points, seen),
     };
-
-    let input_error = match options.check {
-        true => Some(input_error(&gaussians, &views, &context)?),
-        false => None,
+    let evidence = evidence.with_model(&gaussians, &views);
+    let input_views = match options.check {
+        true => checked(&gaussians, &views, &given, &context)?,
+        false => Vec::new(),
     };
+    let reasons = verdict::judge(&Judged {
+        evidence: &evidence,
+        checked: &input_views,
+        calibration: calibration.as_ref(),
+        has_depth: matches!(source, PriorChoice::Given | PriorChoice::Onnx),
+        is_completed: options.symmetry != SymmetryMode::Never,
+    });
     clock.lap("check");
 
     let (stages, total_ms) = clock.finish();
@@ -226,7 +241,12 @@ pub fn reconstruct_on<'a>(
         symmetry: completion,
         relight,
         refinement,
-        input_error,
+        input_error: InputError::over(input_views.iter().map(|view| view.errors)),
+        input_error_by_given_cameras: InputError::over(input_views.iter().map(|view| view.by_given_camera)),
+        input_views,
+        verdict: verdict::verdict(&reasons, options.check),
+        verdict_reasons: reasons,
+        evidence,
         settings: options.clone(),
     };
     context.report_end()?;

@@ -195,7 +195,7 @@ fn expected(outcome: Outcome, words: String) -> Expect {
 const SIZED: [&str; 2] = ["vg_report_get_figures", "vg_scene_get_view"];
 
 /// Functions that cannot fail, all called by `what_cannot_fail_accepts_null`.
-const NEVER_FAIL: [&str; 28] = [
+const NEVER_FAIL: [&str; 29] = [
     "vg_version",
     "vg_abi_version",
     "vg_status_name",
@@ -205,6 +205,7 @@ const NEVER_FAIL: [&str; 28] = [
     "vg_context_threads",
     "vg_context_free",
     "vg_report_json",
+    "vg_report_reason",
     "vg_report_point_count",
     "vg_report_point_positions",
     "vg_report_point_colors",
@@ -249,6 +250,7 @@ fn what_cannot_fail_accepts_null() {
         assert_eq!(vg_gaussians_ply_size(null()), 0);
         assert_eq!(CStr::from_ptr(vg_error_message(null())), c"");
         assert_eq!(CStr::from_ptr(vg_report_json(null())), c"");
+        assert_eq!(CStr::from_ptr(vg_report_reason(null(), 0)), c"");
         assert_eq!(vg_context_threads(null()), 0);
         assert_eq!(vg_report_point_count(null()), 0);
         assert!(vg_report_point_positions(null()).is_null() && vg_report_point_colors(null()).is_null());
@@ -1402,6 +1404,39 @@ fn figures_tell_the_prior_and_its_box() {
             Some(other) => panic!("{other}"),
         };
         assert_eq!(figures.calibration, calibration as i32);
+        let verdict = match told["verdict"].as_str() {
+            Some("good") => vg_verdict::Good,
+            Some("unchecked") => vg_verdict::Unchecked,
+            Some("doubtful") => vg_verdict::Doubtful,
+            Some("bad") => vg_verdict::Bad,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(figures.verdict, verdict as i32);
+        let reasons = told["verdict_reasons"].as_array().unwrap();
+        assert_eq!(figures.reason_count as usize, reasons.len());
+        for (index, reason) in reasons.iter().enumerate() {
+            let line = unsafe { CStr::from_ptr(vg_report_reason(made.handle("out_report") as _, index)) };
+            assert!(line.to_str().unwrap().contains(reason["found"].as_str().unwrap()));
+        }
+        let beyond = unsafe { vg_report_reason(made.handle("out_report") as _, reasons.len()) };
+        assert_eq!(unsafe { CStr::from_ptr(beyond) }, c"");
+        for (error, [psnr, iou, covered]) in [
+            (
+                &told["input_error"],
+                [figures.input_psnr_db, figures.input_silhouette_iou, figures.input_mask_covered],
+            ),
+            (
+                &told["input_error_by_given_cameras"],
+                [
+                    figures.input_given_psnr_db,
+                    figures.input_given_silhouette_iou,
+                    figures.input_given_mask_covered,
+                ],
+            ),
+        ] {
+            let number = |name: &str| error[name].as_f64().unwrap();
+            assert_eq!([psnr, iou, covered], ["psnr_db", "silhouette_iou", "mask_covered"].map(number));
+        }
         let degrees = told["calibration"]["yaw_degrees"].as_f64().unwrap_or(0.0);
         assert!((figures.calibration_yaw_degrees - degrees).abs() < 1e-12);
     }

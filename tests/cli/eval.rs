@@ -14,6 +14,7 @@ fn an_evaluation_prints_a_table_and_writes_the_same_numbers_as_json() {
     let row = &document["splits"][0];
     assert_eq!((row["scene"].as_str(), row["split"].as_str()), (Some("sedan"), Some("right_to_left")));
     assert_eq!((row["prior"].as_str(), document["repeat"].as_u64()), (Some("hull"), Some(2)));
+    assert_eq!((row["verdict"].as_str(), document["mean"]["verdict"].as_str()), (Some("good"), Some("good")));
     let psnr = row["psnr_db"].as_f64().unwrap();
     assert!(lines[1].contains(&format!("{psnr:.3}")), "{out}");
     // Far below what is reached: this guards the protocol (white background, sides, masks), not the method.

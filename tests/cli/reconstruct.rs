@@ -96,6 +96,61 @@ fn options_reach_the_library() {
     assert_eq!((report["sh_degree"].as_u64(), report["threads"].as_u64()), (Some(0), Some(1)));
 }
 
+/// The sample with all camera centres at a share of their distance: a vehicle of that share of its size.
+fn shrunk(scale: f64) -> tempfile::TempDir {
+    let scene = copy_of_sample(&["images", "masks", "transforms.json"]);
+    let path = scene.path().join("transforms.json");
+    let mut cameras = json(&path);
+    for frame in cameras["frames"].as_array_mut().unwrap() {
+        for row in 0..3 {
+            let number = &mut frame["transform_matrix"][row][3];
+            *number = (scale * number.as_f64().unwrap()).into();
+        }
+        frame.as_object_mut().unwrap().remove("depth_file_path");
+    }
+    fs::write(&path, cameras.to_string()).unwrap();
+    scene
+}
+
+#[test]
+fn a_result_that_is_not_to_be_believed_is_a_warning_and_with_strict_a_failure_without_a_file() {
+    let scene = shrunk(0.18);
+    let at = scene.path();
+    let common = format!("reconstruct {{}} --views {INPUTS} --prior hull --resolution 0.5");
+    let run = vg_in(at, &format!("{common} -o {{}}/a.ply --report {{}}/r.json"));
+    assert_eq!(run.code, 0, "{run:?}");
+    assert!(run.err.lines().all(|line| line.starts_with("vg: warning: ")), "{run:?}");
+    assert!(run.err.contains("vg: warning: the vehicle is 0.8") && run.err.contains("metres"), "{run:?}");
+    assert!(run.out.contains("verdict: bad"), "{run:?}");
+    let report = json(&at.join("r.json"));
+    assert_eq!(
+        (report["verdict"].as_str(), report["verdict_reasons"][0]["code"].as_str()),
+        (Some("bad"), Some("too-small"))
+    );
+    for strict in ["--strict", "--strict=bad", "--strict=doubtful"] {
+        fail(
+            at,
+            &format!("{common} {strict} -o {{}}/b.ply --report {{}}/b.json"),
+            1,
+            &["--strict: the result is bad", "the vehicle is 0.8"],
+        );
+        assert!(!at.join("b.ply").exists() && !at.join("b.json").exists(), "{strict}");
+    }
+    fail(at, &format!("{common} --strict=good -o {{}}/b.ply"), 2, &["--strict", "doubtful, bad"]);
+}
+
+#[test]
+fn a_good_result_passes_strict_and_each_view_has_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = format!("reconstruct . --views {INPUTS} --prior hull --strict -o {{}}/a.ply");
+    let out = succeed(folder.path(), &words).out;
+    assert!(out.contains("verdict: good"), "{out}");
+    for view in INPUTS.split(',') {
+        let line = out.lines().find(|line| line.trim_start().starts_with(&format!("{view}.png: ")));
+        assert!(line.is_some_and(|line| line.contains(" dB, IoU 0.9")), "{out}");
+    }
+}
+
 #[test]
 fn depth_scale_replaces_the_scenes_unit() {
     let folder = tempfile::tempdir().unwrap();

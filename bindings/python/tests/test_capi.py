@@ -39,6 +39,7 @@ ENUMERATIONS = {
     "vg_keep": capi.Keep,
     "vg_log_level": capi.LogLevel,
     "vg_calibration": capi.Calibration,
+    "vg_verdict": capi.Verdict,
     "vg_backend": capi.Backend,
     "vg_background": capi.Background,
     "vg_alpha": capi.Alpha,
@@ -381,6 +382,11 @@ def test_figures_are_those_of_the_report(ellipsoid: Views) -> None:
     assert figures.photo_found == (told["photo"] or {"found": 0})["found"]
     assert figures.relit_count == (told["relight"] or {"clones": 0})["clones"]
     assert figures.cloud_used == 0
+    assert (figures.verdict, told["verdict"], figures.reason_count) == (capi.Verdict.GOOD, "good", 0)
+    assert capi.library.vg_report_reason(report, 0) == b""
+    by_given = told["input_error_by_given_cameras"]
+    assert figures.input_given_psnr_db == pytest.approx(by_given["psnr_db"], rel=1e-12)
+    assert figures.input_given_silhouette_iou == pytest.approx(by_given["silhouette_iou"], rel=1e-12)
     capi.library.vg_report_free(report)
     capi.library.vg_gaussians_free(car)
 

@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 import vehicle_gaussians as vg
+from vehicle_gaussians import capi
 from conftest import AXES, UNSEEN, Views, on_white, psnr, same_bytes
 
 
@@ -35,6 +36,25 @@ def test_the_report_is_a_dict_with_the_names_of_the_views(sedan_made: vg.Reconst
     assert report["gaussians"] == len(sedan_made.gaussians)
     assert report["input_error"]["psnr_db"] > 25
     assert [stage["name"] for stage in report["stages"]][-1] == "check"
+
+
+def test_a_verdict_that_is_not_good_warns_in_both_faces(ellipsoid: Views) -> None:
+    def shrunk(camera: vg.Camera) -> vg.Camera:
+        pose = camera.vehicle_from_camera.copy()
+        pose[:3, 3] *= 0.18
+        return vg.Camera.from_matrix(camera.K, pose, camera.width, camera.height)
+
+    cameras = [shrunk(camera) for camera in ellipsoid.cameras]
+    reports = []
+    for face in (vg, capi):
+        with pytest.warns(vg.VgWarning, match=r"^bad: the vehicle is 0\.7.*metres") as caught:
+            reports.append(face.reconstruct(ellipsoid.images, ellipsoid.masks, cameras, prior="hull").report)
+        assert all(warning.filename == __file__ for warning in caught)
+    for report in reports:
+        assert report["verdict"] == "bad"
+        assert "too-small" in [reason["code"] for reason in report["verdict_reasons"]]
+        assert [view["name"] for view in report["input_views"]] == ["000", "001", "002", "003"]
+        assert report["input_error_by_given_cameras"] == report["input_error"]
 
 
 def test_points_are_metric_and_coloured_and_only_made_when_asked_for(ellipsoid: Views, made: vg.Reconstruction) -> None:

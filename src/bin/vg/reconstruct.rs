@@ -1,12 +1,12 @@
 //! `vg reconstruct`: a scene in, a model out.
 
-use crate::args::ReconstructArgs;
-use crate::job::{Outcome, Result, note};
+use crate::args::{ReconstructArgs, Strict, StrictArgs};
+use crate::job::{Failure, Outcome, Result, note};
 use crate::shown::Bar;
 use crate::{cloud, files, scene, shown};
 use vg::io::ply;
 use vg::onnx::Model;
-use vg::pipeline::{self, Options, Reconstruction, Report};
+use vg::pipeline::{self, CheckedView, InputError, Options, Reconstruction, Report, Verdict};
 use vg::progress::Threads;
 use vg::scene::Segmenter;
 use vg::{Scene, View, io};
@@ -39,6 +39,7 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
     let settings = Options { points: args.points.is_some(), check: !args.no_check, ..args.method.options()? };
     let made = reconstruct(&opened.scene, &settings)?;
     note_warnings(&made.report);
+    accept(&made.report, &args.strict)?;
     ply::write(&args.output, &made.gaussians)?;
     if let (Some(path), Some(cloud)) = (&args.points, &made.points) {
         ply::write_points(path, &cloud.positions, &cloud.colors)?;
@@ -46,14 +47,46 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
     if let Some(path) = &args.report {
         files::write_json(path, &made.report)?;
     }
-    Ok(Outcome::done(format!("{}: {}{masks_by}", args.output.display(), summary(&made))))
+    Ok(Outcome::done(format!(
+        "{}: {}{masks_by}{}",
+        args.output.display(),
+        summary(&made),
+        views(&made.report)
+    )))
 }
 
 /// What a user should hear of a reconstruction that went well.
 pub(crate) fn note_warnings(report: &Report) {
+    for reason in &report.verdict_reasons {
+        note(&reason.to_string());
+    }
     let of_network = report.network.iter().flat_map(|network| &network.warnings);
     for warning in report.warnings.iter().chain(of_network) {
         note(warning);
+    }
+}
+
+/// An error where the caller does not want what the verdict says. The reasons were noted.
+pub(crate) fn accept(report: &Report, strict: &StrictArgs) -> Result<()> {
+    let least = match strict.strict {
+        None => return Ok(()),
+        Some(Strict::Doubtful) => Verdict::Unchecked,
+        Some(Strict::Bad) => Verdict::Bad,
+    };
+    if report.verdict < least {
+        return Ok(());
+    }
+    let verdict = verdict(report.verdict);
+    Err(Failure::job(format!("--strict: the result is {verdict}, and nothing was written")))
+}
+
+/// As users read it.
+pub(crate) fn verdict(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Good => "good",
+        Verdict::Unchecked => "unchecked",
+        Verdict::Doubtful => "doubtful",
+        Verdict::Bad => "bad",
     }
 }
 
@@ -82,20 +115,55 @@ pub(crate) fn reconstruct(scene: &Scene, options: &Options) -> Result<Reconstruc
 pub(crate) fn summary(made: &Reconstruction) -> String {
     let report = &made.report;
     let size = report.vehicle.map_or_else(String::new, |v| format!("{}, ", shown::size(&v)));
-    let check = report.input_error.map_or_else(String::new, |e| {
-        format!(
-            "; on these views PSNR {:.2} dB, silhouette IoU {:.3}, at least {:.1} % of each mask covered",
-            e.psnr_db,
-            e.silhouette_iou,
-            100.0 * e.mask_covered
-        )
-    });
     format!(
-        "{} Gaussians, {size}SH degree {}, prior {}, {} views, {:.2} s{check}",
+        "{} Gaussians, {size}SH degree {}, prior {}, {} views, {:.2} s{}; verdict: {}",
         shown::count(report.gaussians),
         report.sh_degree,
         report.prior,
         report.views_used.len(),
         report.total_ms / 1e3,
+        check(report),
+        verdict(report.verdict),
     )
+}
+
+/// What the check says of all views.
+fn check(report: &Report) -> String {
+    let Some(InputError { psnr_db, silhouette_iou, mask_covered }) = report.input_error else {
+        return String::new();
+    };
+    let given = report.input_error_by_given_cameras.filter(|given| Some(*given) != report.input_error);
+    let given = given.map_or_else(String::new, |given| {
+        format!(" ({:.2} dB, {:.3} by the cameras as given)", given.psnr_db, given.silhouette_iou)
+    });
+    format!(
+        "; on these views PSNR {psnr_db:.2} dB, silhouette IoU {silhouette_iou:.3}{given}, at least {:.1} % of each mask \
+         covered",
+        100.0 * mask_covered
+    )
+}
+
+/// What the check says of each view, a line each.
+fn views(report: &Report) -> String {
+    /// More are for the report.
+    const MOST: usize = 16;
+    let line = |view: &CheckedView| {
+        let CheckedView { name, errors, by_given_camera: given } = view;
+        let given = match given == errors {
+            true => String::new(),
+            false => {
+                format!(" ({:.2} dB, {:.3} by the camera as given)", given.psnr_db, given.silhouette_iou)
+            }
+        };
+        let InputError { psnr_db, silhouette_iou, mask_covered } = errors;
+        format!(
+            "\n  {name}: {psnr_db:.2} dB, IoU {silhouette_iou:.3}{given}, {:.1} % covered",
+            100.0 * mask_covered
+        )
+    };
+    let more = match report.input_views.len().saturating_sub(MOST) {
+        0 => String::new(),
+        more => format!("\n  and {more} more, which --report tells"),
+    };
+    report.input_views.iter().take(MOST).map(line).collect::<String>() + &more
 }

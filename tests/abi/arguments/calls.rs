@@ -1264,6 +1264,12 @@ fn figures() -> Lent {
         uncovered_after: elsewhere(),
         refine_iterations: elsewhere(),
         refine_kept: elsewhere(),
+        input_mask_covered: elsewhere(),
+        input_given_psnr_db: elsewhere(),
+        input_given_silhouette_iou: elsewhere(),
+        input_given_mask_covered: elsewhere(),
+        verdict: elsewhere(),
+        reason_count: elsewhere(),
     });
     Lent::zeroed::<vg_report_figures>("vg_report_figures", fields)
 }

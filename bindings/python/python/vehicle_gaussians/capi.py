@@ -124,6 +124,12 @@ class Calibration(enum.IntEnum):
     NONE, NOT_NEEDED, ACCEPTED, REFUSED = range(4)
 
 
+class Verdict(enum.IntEnum):
+    """vg_verdict"""
+
+    GOOD, UNCHECKED, DOUBTFUL, BAD = range(4)
+
+
 class Backend(enum.IntEnum):
     """vg_backend"""
 
@@ -281,6 +287,12 @@ class vg_report_figures(ct.Structure):
         ("uncovered_after", ct.c_double),
         ("refine_iterations", ct.c_uint32),
         ("refine_kept", ct.c_uint32),
+        ("input_mask_covered", ct.c_double),
+        ("input_given_psnr_db", ct.c_double),
+        ("input_given_silhouette_iou", ct.c_double),
+        ("input_given_mask_covered", ct.c_double),
+        ("verdict", ct.c_int32),
+        ("reason_count", ct.c_uint32),
     )
 
 
@@ -529,6 +541,7 @@ PROTOTYPES: Mapping[str, tuple[Any, tuple[Any, ...]]] = {
     "vg_report_figures_init": (_i32, (_pointer(vg_report_figures), _size)),
     "vg_report_get_figures": (_i32, (_handle, _pointer(vg_report_figures), _out)),
     "vg_report_json": (_text, (_handle,)),
+    "vg_report_reason": (_text, (_handle, _size)),
     "vg_report_point_count": (_size, (_handle,)),
     "vg_report_point_positions": (_numbers, (_handle,)),
     "vg_report_point_colors": (_numbers, (_handle,)),

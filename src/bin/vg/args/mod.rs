@@ -11,7 +11,7 @@ pub(crate) use eval::{EvalArgs, JudgeArgs, ParetoArgs, TableName, VehiclesArgs};
 pub(crate) use method::MethodArgs;
 pub(crate) use report::ReportArgs;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use values::{backend, background, picture_size, positive, refinement};
 use vg::refine::Amount;
@@ -74,6 +74,30 @@ pub(crate) struct DepthArgs {
     pub(crate) depth_scale: Option<f64>,
 }
 
+/// What becomes of a result that is not to be believed.
+#[derive(Args)]
+pub(crate) struct StrictArgs {
+    /// Fail and write nothing where the verdict is not good; with =bad, only where it is bad
+    #[arg(
+        long,
+        value_name = "doubtful|bad",
+        value_enum,
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "doubtful"
+    )]
+    pub(crate) strict: Option<Strict>,
+}
+
+/// From which verdict on a job fails.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Strict {
+    /// Doubtful and bad, and unchecked for a budget.
+    Doubtful,
+    /// Bad alone.
+    Bad,
+}
+
 #[derive(Args)]
 pub(crate) struct ReconstructArgs {
     /// A transforms.json, a folder with one, or a COLMAP folder (images/, masks/, sparse/0)
@@ -96,8 +120,10 @@ pub(crate) struct ReconstructArgs {
     #[arg(long, value_name = "P.ply", conflicts_with = "baseline")]
     pub(crate) points: Option<PathBuf>,
     /// Do not draw the model into the input views to report the error there: about twice as fast with given depth
-    #[arg(long)]
+    #[arg(long, conflicts_with = "strict")]
     pub(crate) no_check: bool,
+    #[command(flatten)]
+    pub(crate) strict: StrictArgs,
     /// Write what was done: settings, stage times, counts, what was left out and why, errors
     #[arg(long, value_name = "R.json")]
     pub(crate) report: Option<PathBuf>,

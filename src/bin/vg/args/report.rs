@@ -1,6 +1,6 @@
 //! Options of `vg report`.
 
-use super::{DepthArgs, FrameArgs, MethodArgs, ViewsArgs};
+use super::{DepthArgs, FrameArgs, MethodArgs, StrictArgs, ViewsArgs};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -23,6 +23,8 @@ pub(crate) struct ReportArgs {
     pub(crate) frame: FrameArgs,
     #[command(flatten)]
     pub(crate) depth: DepthArgs,
+    #[command(flatten)]
+    pub(crate) strict: StrictArgs,
     /// The page
     #[arg(short, long, value_name = "PAGE.html")]
     pub(crate) output: PathBuf,

@@ -13,7 +13,7 @@ use std::path::Path;
 use std::time::Instant;
 use vg::io::SceneOptions;
 use vg::metrics::{SurfaceErrors, ViewErrors};
-use vg::pipeline::{Options, PriorChoice};
+use vg::pipeline::{Options, PriorChoice, Verdict};
 use vg::progress::Threads;
 use vg::render::{CpuRenderer, RenderOptions, Rendered, Renderer};
 use vg::scene::Cloud;
@@ -45,6 +45,8 @@ pub(crate) struct Measured {
     pub(crate) render_ms: f64,
     /// In the model.
     pub(crate) gaussians: f64,
+    /// The method's own verdict on its input and result, the worst of several; `None` of what was made elsewhere.
+    pub(crate) verdict: Option<Verdict>,
     /// Each test view.
     pub(crate) views: Vec<MeasuredView>,
 }
@@ -88,6 +90,7 @@ pub(crate) fn split(from: &Shown, split: &Split, method: &Options, judge: &OfVeh
     let mut measured = model(from, split, &made.gaussians, method.threads, judge)?;
     measured.prior = made.report.prior.to_owned();
     measured.reconstruct_ms = Some(made.report.total_ms);
+    measured.verdict = Some(made.report.verdict);
     if made.report.prior == "given" {
         (measured.input_depth_mae_m, measured.input_depth_p90_m) = (None, None);
     }
@@ -165,6 +168,7 @@ pub(crate) fn judge(made: &Gaussians, views: &[View], threads: usize) -> Result<
         reconstruct_ms: None,
         render_ms,
         gaussians: made.len() as f64,
+        verdict: None,
         views: views
             .iter()
             .zip(each)
@@ -219,6 +223,7 @@ pub(crate) fn mean(all: &[&Measured]) -> Option<Measured> {
         reconstruct_ms: mean_of(all.iter().filter_map(|m| m.reconstruct_ms)),
         render_ms: of(|m| m.render_ms)?,
         gaussians: of(|m| m.gaussians)?.round(),
+        verdict: all.iter().filter_map(|m| m.verdict).max(),
         views: Vec::new(),
     })
 }

@@ -56,7 +56,7 @@ pub(super) fn parts(report: &Report) -> Vec<Part> {
         part("Depth from a network", report.network.as_ref().map(network)),
         part("Budget", report.plan.as_ref().map(budget)),
         part("Refinement", report.refinement.as_ref().map(refinement)),
-        part("The method's own check in its inputs", report.input_error.as_ref().map(check)),
+        part("The method's own check in its inputs", report.input_error.map(|error| check(error, report))),
     ]
     .into_iter()
     .flatten()
@@ -183,11 +183,19 @@ fn refinement(done: &Refinement) -> Rows {
     rows
 }
 
-fn check(error: &InputError) -> Rows {
+fn check(used: InputError, report: &Report) -> Rows {
+    let given = report.input_error_by_given_cameras.unwrap_or(used);
+    let both = |text: &dyn Fn(InputError) -> String| match given == used {
+        true => text(used),
+        false => format!("{} (by the cameras as given {})", text(used), text(given)),
+    };
     vec![
-        ("PSNR", format!("{} dB", psnr(error.psnr_db))),
-        ("silhouette IoU", decimals(Some(error.silhouette_iou), 4)),
-        ("of each mask at least covered", format!("{} %", decimals(Some(100.0 * error.mask_covered), 1))),
+        ("PSNR", both(&|e| format!("{}\u{a0}dB", psnr(e.psnr_db)))),
+        ("silhouette IoU", both(&|e| decimals(Some(e.silhouette_iou), 4))),
+        (
+            "of each mask at least covered",
+            both(&|e| format!("{}\u{a0}%", decimals(Some(100.0 * e.mask_covered), 1))),
+        ),
     ]
 }
 

@@ -45,6 +45,7 @@ pub(crate) fn run(args: &ReportArgs) -> Result {
     opened.cloud = cloud_file.as_deref().map(cloud::read).transpose()?;
     let made = reconstruct::reconstruct(&opened, &method.options()?)?;
     reconstruct::note_warnings(&made.report);
+    reconstruct::accept(&made.report, &args.strict)?;
 
     let threads = Threads::new(method.threads)?;
     let inputs = compare::views(&made.gaussians, &opened.views, Role::Input, &threads)?;

@@ -5,10 +5,11 @@ use super::compare::{self, Compared, Role};
 use super::facts;
 use super::pictures::{self, Picture};
 use super::text::{decimals, escaped, ms, psnr};
+use crate::reconstruct::verdict;
 use crate::shown;
 use std::fmt::{self, Write};
 use vg::metrics::ViewErrors;
-use vg::pipeline::Report;
+use vg::pipeline::{CheckedView, InputError, Report};
 
 /// What the page is about.
 pub(super) struct Run<'a> {
@@ -83,6 +84,7 @@ fn header(out: &mut String, run: &Run, vehicle: &str) -> fmt::Result {
         figure("SSIM there", &decimals(mean.ssim, 3))?;
         figure("silhouette IoU there", &decimals(Some(mean.silhouette_iou), 3))?;
     }
+    figure("verdict", verdict(report.verdict))?;
     figure("reconstruction", &format!("{:.2} s", report.total_ms / 1e3))?;
     let mut times: Vec<f64> = judged.iter().map(|one| one.render_ms).collect();
     times.sort_by(f64::total_cmp);
@@ -308,7 +310,38 @@ fn details(out: &mut String, report: &Report) -> fmt::Result {
         }
         out.push_str("</dl>\n</div>\n");
     }
-    out.push_str("</div>\n</section>\n");
+    out.push_str("</div>\n");
+    checked(out, &report.input_views)?;
+    out.push_str("</section>\n");
+    Ok(())
+}
+
+/// Each input as the method's own check found it.
+fn checked(out: &mut String, views: &[CheckedView]) -> fmt::Result {
+    if views.is_empty() {
+        return Ok(());
+    }
+    out.push_str(
+        "<h3>The check of each input, by the camera that was used, and by the camera as given</h3>\n",
+    );
+    out.push_str("<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">view</th>");
+    for name in ["PSNR, dB", "as given", "silhouette IoU", "as given", "mask covered, %", "as given"] {
+        write!(out, "<th scope=\"col\">{name}</th>")?;
+    }
+    out.push_str("</tr></thead>\n<tbody>\n");
+    for CheckedView { name, errors, by_given_camera } in views {
+        write!(out, "<tr><th scope=\"row\">{}</th>", escaped(name))?;
+        let columns: [fn(&InputError) -> String; 3] = [
+            |e| psnr(e.psnr_db),
+            |e| decimals(Some(e.silhouette_iou), 4),
+            |e| decimals(Some(100.0 * e.mask_covered), 1),
+        ];
+        for text in columns {
+            write!(out, "<td>{}</td><td>{}</td>", text(errors), text(by_given_camera))?;
+        }
+        out.push_str("</tr>\n");
+    }
+    out.push_str("</tbody>\n</table></div>\n");
     Ok(())
 }
 

@@ -292,6 +292,9 @@ static vg_gaussians *reconstruct(vg_context *context, const vg_view *views, size
     CHECK(quick || (figures.input_psnr_db > 20 && figures.input_silhouette_iou > 0.9));
     CHECK(figures.extent_high[0] - figures.extent_low[0] > 3.5 && figures.extent_high[0] - figures.extent_low[0] < 6);
     CHECK(strstr(vg_report_json(report), "\"left_out\"") != NULL);
+    CHECK(figures.verdict == (quick ? VG_VERDICT_UNCHECKED : VG_VERDICT_GOOD));
+    CHECK(figures.reason_count == 0 && vg_report_reason(report, 0)[0] == '\0');
+    CHECK(figures.input_given_psnr_db == figures.input_psnr_db);
     points = vg_report_point_count(report);
     CHECK(points > 1000 && isfinite(vg_report_point_positions(report)[3 * points - 1]));
     CHECK(vg_report_point_colors(report) != NULL);

@@ -1,0 +1,118 @@
+//! Whether a reconstruction is to be believed, and if not, why: evidence -> rules -> verdict with reasons.
+//!
+//! Nothing here changes the model. Where the thresholds come from is in docs/VERDICT.md.
+
+mod coherence;
+mod evidence;
+mod photographs;
+mod rules;
+
+pub use evidence::{Evidence, ViewEvidence};
+pub(super) use evidence::{Examined, compare, glance};
+pub(super) use rules::{Judged, judge};
+
+use serde::Serialize;
+use std::fmt;
+
+/// Whether a reconstruction is to be believed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Nothing looks wrong.
+    #[default]
+    Good,
+    /// Nothing looks wrong, but the check was switched off: views were not compared with one another.
+    Unchecked,
+    /// Something looks wrong; the model may still be of use.
+    Doubtful,
+    /// The input contradicts itself, or describes no road vehicle.
+    Bad,
+}
+
+/// What a reason is about. The names in reports are those of the variants in kebab-case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum ReasonCode {
+    /// The vehicle is larger than any on the road.
+    TooLarge,
+    /// The vehicle is smaller than any on the road.
+    TooSmall,
+    /// The vehicle is wider or taller than vehicles of its length are.
+    Proportions,
+    /// The cameras are far away from the vehicle, or the vehicle from the origin.
+    FarAway,
+    /// A mask looks as if vehicle and background had changed places.
+    MaskInverted,
+    /// A lens model has no ray for a part of the vehicle's pixels.
+    Lens,
+    /// One view contradicts the others.
+    ViewDisagrees,
+    /// The views contradict each other, and leaving one out does not help.
+    ViewsDisagree,
+    /// The views agree with one another, but not with their mirror images.
+    Symmetry,
+    /// The depth is of another unit than the poses.
+    DepthUnit,
+    /// The depth lies outside the other views' silhouettes.
+    DepthOutside,
+    /// The photographs do not show the same things in the same places.
+    Photographs,
+    /// The model's silhouette in a view is not its mask.
+    Silhouette,
+    /// The model's picture in a view is not its photograph.
+    Picture,
+    /// A correction of the cameras was estimated and not believed.
+    CalibrationRefused,
+    /// The cameras were corrected by more than a few pixels.
+    CamerasCorrected,
+}
+
+/// How much a reason weighs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Severity {
+    /// The verdict is [`Verdict::Doubtful`] at least.
+    Doubtful,
+    /// The verdict is [`Verdict::Bad`].
+    Bad,
+}
+
+/// Why the verdict is not [`Verdict::Good`]. Displayed as one line.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Reason {
+    /// What it is about.
+    pub code: ReasonCode,
+    /// How much it weighs.
+    pub severity: Severity,
+    /// The view's name, where one is concerned.
+    pub view: Option<String>,
+    /// What was found.
+    pub found: String,
+    /// What is expected.
+    pub expected: String,
+    /// The likely cause.
+    pub cause: String,
+    /// The way out.
+    pub remedy: String,
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if let Some(view) = &self.view {
+            write!(f, "view {view}: ")?;
+        }
+        let Self { found, expected, cause, remedy, .. } = self;
+        write!(f, "{found}; expected: {expected}; likely cause: {cause}; {remedy}")
+    }
+}
+
+/// The weight of the heaviest reason; without one, whether there was a check.
+pub(super) fn verdict(reasons: &[Reason], was_checked: bool) -> Verdict {
+    match reasons.iter().map(|reason| reason.severity).max() {
+        None if was_checked => Verdict::Good,
+        None => Verdict::Unchecked,
+        Some(Severity::Doubtful) => Verdict::Doubtful,
+        Some(Severity::Bad) => Verdict::Bad,
+    }
+}
