@@ -51,7 +51,7 @@ def main() -> None:
 
     made = vg.reconstruct(images, masks, cameras, names=names)
     made.gaussians.save_ply(chosen.output)
-    length, width, height = made.report["box"]["size_m"]
+    length, width, height = made.report["vehicle"]["size_m"]
     print(f"{chosen.output}: {made.gaussians}, {length:.2f} x {width:.2f} x {height:.2f} m")
 
 

@@ -18,7 +18,7 @@ use vg::refine::{Amount, RefineOptions};
 use vg::relight::Relight;
 use vg::scene::image::PixelFormat;
 use vg::scene::mask::VEHICLE_THRESHOLD;
-use vg::scene::{Cloud, DepthMap, Mask, RgbImage};
+use vg::scene::{Cloud, DepthMap, Mask, Place, RgbImage};
 use vg::symmetry::SymmetryMode;
 use vg::{Scene, View};
 
@@ -29,7 +29,7 @@ type Points<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>);
 #[pyfunction]
 #[pyo3(signature = (
     images, masks, cameras, depths, *, prior, prior_model, head_model, calibrate, symmetry, relight, photo, cloud,
-    vehicle_size, sh_degree, keep, check, points, budget, resolution, max_views, refine_iterations,
+    vehicle_size, vehicle_place, sh_degree, keep, check, points, budget, resolution, max_views, refine_iterations,
     refine_seconds, refine_hold_out, refine_backend, threads, names, progress
 ))]
 pub(crate) fn reconstruct<'py>(
@@ -47,6 +47,7 @@ pub(crate) fn reconstruct<'py>(
     photo: bool,
     cloud: Option<&Bound<'py, PyAny>>,
     vehicle_size: Option<Bound<'py, PyAny>>,
+    vehicle_place: Option<Bound<'py, PyAny>>,
     #[pyo3(from_py_with = whole::sh_degree)] sh_degree: u8,
     keep: Vec<String>,
     check: bool,
@@ -70,6 +71,10 @@ pub(crate) fn reconstruct<'py>(
         symmetry: parse_symmetry(py, symmetry)?,
         relight: parse_relight(py, relight)?,
         vehicle_size: vehicle_size.map(|size| vector::<3>(&size, "vehicle_size")).transpose()?,
+        vehicle_place: vehicle_place
+            .map(|place| vector::<4>(&place, "vehicle_place"))
+            .transpose()?
+            .map(|[x, y, z, yaw]| Place { center: [x, y, z], yaw }),
         sh_degree,
         keep: parse_keep(py, &keep)?,
         check,

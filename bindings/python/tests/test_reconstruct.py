@@ -136,6 +136,7 @@ def test_options_reach_the_library(ellipsoid: Views) -> None:
         prior="hull",
         symmetry="never",
         vehicle_size=(4.4, 1.8, 1.4),
+        vehicle_place=(0, 0, 0, 0),
         sh_degree=1,
         keep=["silhouette-edge", "sh-bands"],
         check=False,
@@ -151,7 +152,8 @@ def test_options_reach_the_library(ellipsoid: Views) -> None:
     settings = made.report["settings"]
     assert (settings["prior"], settings["symmetry"]) == ("hull", "never")
     assert settings["vehicle_size"] == [4.4, 1.8, 1.4]
-    assert made.report["box"]["source"] == "given"
+    assert settings["vehicle_place"] == {"center": [0, 0, 0], "yaw": 0}
+    assert made.report["working_box"]["contradicted_m"] == 0
     assert {name for name, kept in settings["keep"].items() if kept} == {"silhouette_edge", "sh_bands"}
     assert made.gaussians.sh_degree == 1 and made.report["threads"] == 1
     assert not settings["check"] and not settings["photo"]
@@ -161,6 +163,21 @@ def test_options_reach_the_library(ellipsoid: Views) -> None:
     assert len(made.report["views_used"]) == 2
     assert made.report["refinement"]["iterations"] >= 4
     assert made.report["calibration"] is None and made.report["relight"] is None
+
+
+@pytest.mark.parametrize("face", [vg, capi])
+def test_a_box_may_bring_its_place_by_either_face(face: Any, ellipsoid: Views) -> None:
+    views = (ellipsoid.images[:1], ellipsoid.masks[:1], ellipsoid.cameras[:1])
+    if face is capi:
+        views = (views[0], views[1], [capi.Camera.from_matrix(c.K, c.pose, c.width, c.height) for c in views[2]])
+    made = face.reconstruct(*views, prior="hull", check=False, vehicle_size=(4.4, 1.8, 1.4), vehicle_place=(0, 0, 0, 0))
+    vehicle = made.report["vehicle"]
+    for found, true, error in zip(vehicle["size_m"], (4.4, 1.8, 1.4), vehicle["uncertainty_m"], strict=True):
+        assert abs(found - true) < 2 * error
+    with pytest.raises(vg.VgError, match="vehicle_place.*radians"):
+        face.reconstruct(*views, vehicle_size=(4.4, 1.8, 1.4), vehicle_place=(0, 0, 0, 90))
+    with pytest.raises(vg.VgError, match="vehicle_size: none; allowed: length, width, height"):
+        face.reconstruct(*views, vehicle_place=(0, 0, 0, 0))
 
 
 def test_a_cloud_in_the_vehicle_frame_pulls_the_surface_to_it(ellipsoid: Views) -> None:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from ._gradients import Gradients, Planes
 from ._progress import Progress
-from ._types import Backend, Background, DepthMode, Floats, Heading, Size
+from ._types import Backend, Background, DepthMode, Floats, Heading, Placed, Size
 
 __all__ = [
     "Camera",
@@ -682,6 +682,7 @@ def reconstruct(
     photo: bool,
     cloud: object | None,
     vehicle_size: Size | None,
+    vehicle_place: Placed | None,
     sh_degree: int,
     keep: Sequence[str],
     check: bool,

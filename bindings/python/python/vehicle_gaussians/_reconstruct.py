@@ -16,7 +16,7 @@ from ._documented import documented
 from ._equal import equal_by_value
 from ._native import Camera, Gaussians, Model
 from ._progress import Progress
-from ._types import Backend, Calibrate, Floats, Keep, Mask, Prior, Relight, Size, Symmetry
+from ._types import Backend, Calibrate, Floats, Keep, Mask, Placed, Prior, Relight, Size, Symmetry
 from ._warn import reconstructed
 
 
@@ -59,6 +59,7 @@ def reconstruct(
     photo: bool = True,
     cloud: Floats | None = None,
     vehicle_size: Size | None = None,
+    vehicle_place: Placed | None = None,
     sh_degree: int = 2,
     keep: Keep | Iterable[Keep] = (),
     check: bool = True,
@@ -93,7 +94,11 @@ def reconstruct(
     photo: whether prior "shape" moves its surface to where the photographs agree.
     cloud: points measured on the vehicle, floats (n, 3), metres, vehicle frame, all finite; some may be wrong or show
     something else. Priors "shape" and "hull" bend their surface to them.
-    vehicle_size: length, width, height in metres, where known.
+    vehicle_size: length, width, height in metres, to a few centimetres, where known; the silhouettes tell where a box of
+    this size stands, and no part of the vehicle is placed outside of it.
+    vehicle_place: x, y, z of that box's centre, metres, and its turn about z, radians, in the frame of the cameras, where
+    known to a few decimetres. Its middle plane, not y = 0, is then the plane of symmetry; the result stays in the frame of
+    the cameras.
     sh_degree: highest degree of the colour, 0 to 3.
     keep: what may not be left out as not needed: "duplicate-views", "overlap", "silhouette-edge", "floaters",
     "sh-bands", or "all".
@@ -133,6 +138,7 @@ def reconstruct(
         photo=photo,
         cloud=cloud,
         vehicle_size=vehicle_size,
+        vehicle_place=vehicle_place,
         sh_degree=sh_degree,
         keep=[keep] if isinstance(keep, str) else listed(keep, "keep"),
         check=check,

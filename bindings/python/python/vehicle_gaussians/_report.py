@@ -90,15 +90,27 @@ class Calibration:
 
 
 @dataclass(frozen=True)
-class Box:
-    """The box the prior worked in."""
+class VehicleSize:
+    """How long, wide and high the vehicle is; outer mirrors are often missing from the width."""
+
+    size_m: list[float]
+    """Length, width, height, metres."""
+    uncertainty_m: list[float]
+    """Their expected errors, metres."""
+
+
+@dataclass(frozen=True)
+class WorkingBox:
+    """The box the prior looked for the vehicle in, which is larger than the vehicle."""
 
     source: Literal["given", "estimated"]
-    """Where it comes from."""
+    """Whether the caller's size bounds it, or the silhouettes alone."""
     size_m: list[float]
     """Length, width, height, metres."""
     low_m: list[float]
     """Lowest corner, metres."""
+    contradicted_m: float
+    """By how much the caller's size and the silhouettes contradict each other, metres; 0 where they agree."""
 
 
 @dataclass(frozen=True)
@@ -202,7 +214,11 @@ class Plan:
     predicted_s: float
     """The time predicted for what was chosen, seconds."""
     fits: bool
-    """Whether that leaves enough room in the budget; if not, the cheapest was chosen."""
+    """Whether that leaves enough room in the budget; if not, the fastest settings were chosen."""
+    took_s: float
+    """What the call took, seconds, without an optimisation that was asked for in addition."""
+    kept: bool
+    """Whether that is within the budget."""
     machine: Machine
     """How fast this machine was found to be."""
     chosen: Chosen
@@ -286,6 +302,42 @@ class InputError:
 
 
 @dataclass(frozen=True)
+class InputView:
+    """The model rendered back into one input view."""
+
+    name: str
+    """The view's name."""
+    psnr_db: float
+    """Full frame, dB, drawn by the camera that was used: the calibration's, where it moved the camera."""
+    silhouette_iou: float
+    """Alpha of half and more against the mask."""
+    mask_covered: float
+    """The part of the mask that is drawn with alpha of half and more, 0 to 1."""
+    by_given_camera: InputError
+    """The same drawn by the caller's own camera."""
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why the verdict is not good."""
+
+    code: str
+    """What it is about."""
+    severity: Literal["doubtful", "bad"]
+    """How much it weighs."""
+    view: str | None
+    """The view's name, where one is concerned."""
+    found: str
+    """What was found."""
+    expected: str
+    """What is expected."""
+    cause: str
+    """The likely cause."""
+    remedy: str
+    """The way out."""
+
+
+@dataclass(frozen=True)
 class Report:
     """What a reconstruction did, how long it took, what was left out and why.
 
@@ -318,8 +370,10 @@ class Report:
     """Names of the views that were used."""
     calibration: Calibration | None
     """How the cameras were corrected; None if that was switched off or these views cannot be calibrated."""
-    box: Box | None
-    """The box the prior worked in, in the corrected frame."""
+    vehicle: VehicleSize | None
+    """How long, wide and high the vehicle is; None for a baseline."""
+    working_box: WorkingBox | None
+    """The box the prior looked for the vehicle in, in the corrected frame."""
     cloud: PointFit | None
     """What the prior made of points measured on the vehicle."""
     photo: PhotoFit | None
@@ -341,7 +395,17 @@ class Report:
     refinement: Refinement | None
     """What the optimisation did, where it was asked for."""
     input_error: InputError | None
-    """Error on the input views, unless the check was switched off."""
+    """Error on the input views as drawn by the cameras that were used, unless the check was switched off."""
+    input_error_by_given_cameras: InputError | None
+    """The same as drawn by the caller's own cameras."""
+    input_views: list[InputView]
+    """The errors in each view; empty if the check was switched off."""
+    verdict: Literal["good", "unchecked", "doubtful", "bad"]
+    """Whether the result is to be believed."""
+    verdict_reasons: list[Reason]
+    """Why it is not good."""
+    evidence: dict[str, Any]
+    """The numbers that the verdict goes by."""
     settings: dict[str, Any]
     """The options of the call; where it had a budget, those that were chosen."""
 

@@ -33,3 +33,5 @@ Floats: TypeAlias = npt.NDArray[np.floating[Any]] | Sequence[Any]
 Mask: TypeAlias = npt.NDArray[np.bool_] | npt.NDArray[np.uint8]
 #: Three lengths, metres: length, width, height.
 Size: TypeAlias = Sequence[float] | npt.NDArray[Any]
+#: Where a box stands: x, y, z of its centre, metres, and its turn about z, radians.
+Placed: TypeAlias = Sequence[float] | npt.NDArray[Any]

@@ -254,6 +254,10 @@ class vg_options(ct.Structure):
         ("refine_hold_out", ct.c_int32),
         ("refine_backend", ct.c_int32),
         ("refine_flags", ct.c_uint32),
+        ("vehicle_center", ct.c_double * 3),
+        ("vehicle_yaw", ct.c_double),
+        ("has_vehicle_place", ct.c_int32),
+        ("vehicle_flags", ct.c_uint32),
         ("progress_overall", ct.POINTER(ct.c_double)),
     )
 
@@ -287,6 +291,10 @@ class vg_report_figures(ct.Structure):
         ("uncovered_after", ct.c_double),
         ("refine_iterations", ct.c_uint32),
         ("refine_kept", ct.c_uint32),
+        ("vehicle_size", ct.c_double * 3),
+        ("vehicle_size_uncertainty", ct.c_double * 3),
+        ("has_vehicle_size", ct.c_int32),
+        ("budget_kept", ct.c_int32),
         ("input_mask_covered", ct.c_double),
         ("input_given_psnr_db", ct.c_double),
         ("input_given_silhouette_iou", ct.c_double),
@@ -1468,6 +1476,7 @@ def reconstruct(
     photo: bool = True,
     cloud: _types.Floats | None = None,
     vehicle_size: _types.Size | None = None,
+    vehicle_place: _types.Placed | None = None,
     sh_degree: int = 2,
     keep: Keep | int | _types.Keep | Iterable[_types.Keep] = 0,
     check: bool = True,
@@ -1523,6 +1532,9 @@ def reconstruct(
     options.check, options.points = check, points
     if vehicle_size is not None:
         options.vehicle_size[:] = doubles(vehicle_size, "vehicle_size", (3,)).tolist()
+    if vehicle_place is not None:
+        *center, options.vehicle_yaw = doubles(vehicle_place, "vehicle_place", (4,)).tolist()
+        options.vehicle_center[:], options.has_vehicle_place = center, 1
     car, report = ct.c_void_p(), ct.c_void_p()
     with _told(options, progress) as raised:
         options.log = LogFn(_logger(log, raised)) if log is not None else LogFn()
