@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -57,6 +58,14 @@ def test_only_the_c_library_is_called_libvg() -> None:
     # A program in the same process that needs libvg.so.0 would be given the extension module instead.
     native = Path(vg._native.__file__).read_bytes()
     assert b"libvg.so.0" not in native and b"libvg.so.0" in capi.library_path().read_bytes()
+
+
+@pytest.mark.skipif(sys.platform != "linux" or shutil.which("readelf") is None, reason="readelf reads ELF")
+def test_both_libraries_stay_in_memory_when_they_are_unloaded() -> None:
+    # A thread that called one of them runs its destructors when it ends, which may be later.
+    for library in (Path(vg._native.__file__), capi.library_path()):
+        read = subprocess.run(["readelf", "-d", "-W", str(library)], capture_output=True, text=True, check=True)
+        assert any("(FLAGS_1)" in line and "NODELETE" in line for line in read.stdout.splitlines()), library
 
 
 def test_everything_public_has_a_docstring() -> None:
