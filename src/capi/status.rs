@@ -27,6 +27,8 @@ pub enum vg_status {
     Internal = 7,
     /// What was asked for needs something that this machine does not have: ONNX Runtime, a device.
     Missing = 8,
+    /// The operating system did not start the threads that were asked for.
+    Threads = 9,
 }
 
 /// Why a call failed. Owned by the caller, who frees it with `vg_error_free`; it never changes, and any thread may
@@ -74,6 +76,7 @@ impl From<&Error> for vg_status {
             Error::Cancelled { .. } => Self::Cancelled,
             Error::NotBuilt { .. } => Self::NotBuilt,
             Error::Missing { .. } => Self::Missing,
+            Error::Threads { .. } => Self::Threads,
         }
     }
 }

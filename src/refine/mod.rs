@@ -20,7 +20,7 @@ pub(crate) mod tie;
 mod work;
 
 pub use densify::{Densified, Densify};
-pub use model::model;
+pub use model::{model, model_on};
 pub use options::{Amount, RefineOptions};
 pub use parameters::Rates;
 

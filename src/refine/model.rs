@@ -23,15 +23,26 @@ pub fn model<'a>(
     threads: usize,
     progress: &'a mut ProgressCallback<'a>,
 ) -> Result<(Gaussians, Refinement)> {
+    model_on(&Threads::new(threads)?, gaussians, scene, options, progress)
+}
+
+/// The same on threads that are there already.
+pub fn model_on<'a>(
+    threads: &Threads,
+    gaussians: &Gaussians,
+    scene: &Scene,
+    options: &RefineOptions,
+    progress: &'a mut ProgressCallback<'a>,
+) -> Result<(Gaussians, Refinement)> {
+    threads.check_process()?;
     if gaussians.is_empty() {
         return Err(Error::argument("gaussians", "none", "at least one"));
     }
     options.validate()?;
     scene.validate()?;
-    let threads = Threads::new(threads)?;
     // Shorter-lived than the callback it borrows.
     let mut progress = |at| progress(at);
-    let context = Context::new(&threads, &mut progress);
+    let context = Context::new(threads, &mut progress);
     let straight = || scene.views.par_iter().map(undistort::undistorted).collect::<Result<Vec<View>>>();
     let views = context.parallel(straight)?;
     refine(gaussians.clone(), &[], &views, options, &context)

@@ -2,7 +2,6 @@
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::ops::ControlFlow;
-use std::time::Duration;
 use vg::progress::Progress;
 
 /// Steps of the bar per stage.
@@ -46,7 +45,6 @@ impl Bar {
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
-        bar.enable_steady_tick(Duration::from_millis(200));
         Self { bar, first: 0 }
     }
 
@@ -56,6 +54,8 @@ impl Bar {
             Some(loss) => self.bar.set_message(format!("{}, loss {loss:.5}", progress.stage)),
             None => self.bar.set_message(progress.stage),
         }
+        // Time goes on while a stage stands; no thread of its own shows that.
+        self.bar.tick();
         if let Some(stage) = STAGES.iter().position(|s| *s == progress.stage) {
             self.bar.set_position(
                 stage.saturating_sub(self.first) as u64 * STEPS + (progress.fraction * STEPS as f64) as u64,

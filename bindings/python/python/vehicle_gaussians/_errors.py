@@ -25,6 +25,8 @@ class Status(enum.IntEnum):
     INTERNAL = 7
     #: Something is needed that this machine does not have.
     MISSING = 8
+    #: The operating system did not start the threads that were asked for.
+    THREADS = 9
 
 
 class VgError(Exception):
