@@ -153,18 +153,48 @@ fn render(rounds: usize) -> vg::Result<()> {
             assert_eq!(status, vg_status::Ok);
         },
     );
-    unsafe {
-        vg_gaussians_free(car);
-        vg_context_free(context);
-    }
     let size = format!("{} x {} RGBA8", camera.width, camera.height);
     println!("| {size} | {:.2} | {:.2} | {:.4} |", times.rust, times.c, times.ratio);
+
+    println!("\n| context of that picture | ms | beside none named |");
+    println!("| --- | --- | --- |");
+    let draw_in = |context: *mut vg_context| {
+        let drawing = vg_render_options { context, ..drawing };
+        let status =
+            unsafe { vg_render(car, &raw const from_c, &raw const drawing, &raw const target, null_mut()) };
+        assert_eq!(status, vg_status::Ok);
+    };
+    let calling = context_of(1);
+    let anew = |threads: u32| {
+        let context = context_of(threads);
+        draw_in(context);
+        unsafe { vg_context_free(context) };
+    };
+    let ways: [(&str, &dyn Fn()); 4] = [
+        ("one of two threads, kept", &|| draw_in(context)),
+        ("the calling thread, kept", &|| draw_in(calling)),
+        ("two threads, made for the call", &|| anew(THREADS)),
+        ("the calling thread, made for the call", &|| anew(1)),
+    ];
+    for (what, way) in ways {
+        let times = in_turns(rounds * 5, || draw_in(null_mut()), way);
+        println!("| {what} | {:.2} | {:.3} |", times.c, times.ratio);
+    }
+    unsafe {
+        vg_context_free(calling);
+        vg_context_free(context);
+        vg_default_context_free();
+        vg_gaussians_free(car);
+    }
     Ok(())
 }
 
 fn context() -> *mut vg_context {
-    let settings =
-        vg_context_options { struct_size: size_of::<vg_context_options>(), threads: THREADS, flags: 0 };
+    context_of(THREADS)
+}
+
+fn context_of(threads: u32) -> *mut vg_context {
+    let settings = vg_context_options { struct_size: size_of::<vg_context_options>(), threads, flags: 0 };
     let mut context = null_mut();
     assert_eq!(unsafe { vg_context_new(&raw const settings, &raw mut context, null_mut()) }, vg_status::Ok);
     context

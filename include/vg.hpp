@@ -518,6 +518,8 @@ class Context {
     }
 
     std::uint32_t threads() const noexcept { return vg_context_threads(handle_.get()); }
+    /// Ends the threads and frees the memory that calls without a context have made for each other.
+    static void free_default() noexcept { vg_default_context_free(); }
 
     vg_context *get() const noexcept { return handle_.get(); }
     /// The handle, now the caller's to free.

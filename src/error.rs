@@ -65,6 +65,19 @@ pub enum Error {
         /// What to install, and where to say so.
         remedy: String,
     },
+    /// The operating system did not start the threads that were asked for.
+    #[error(
+        "threads: {started} of {count} could be started: {found}; raise the system's limit of threads (ulimit -u), or \
+         ask for 1, which starts none"
+    )]
+    Threads {
+        /// How many were asked for.
+        count: usize,
+        /// How many were started, and ended again.
+        started: usize,
+        /// The system's own words.
+        found: String,
+    },
     /// The progress callback asked to stop.
     #[error("cancelled during {stage}")]
     Cancelled {

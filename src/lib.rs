@@ -32,6 +32,7 @@ pub mod relight;
 pub mod render;
 pub mod scene;
 pub mod symmetry;
+pub mod threads;
 
 pub use error::{Error, Result};
 pub use gaussians::Gaussians;

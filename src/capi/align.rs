@@ -5,6 +5,7 @@ use super::context::{in_context, vg_context};
 use super::guard::guarded;
 use super::image;
 use super::options::vg_progress_fn;
+use super::overlap::{self, Written};
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
 use super::view::vg_view;
@@ -37,7 +38,7 @@ pub enum vg_heading {
 pub struct vg_align_options {
     /// `sizeof(vg_align_options)`.
     pub struct_size: usize,
-    /// Threads to use. NULL: made for this call, one per core.
+    /// Threads to use. NULL: the process's own, one per core, see `vg_default_context_free`.
     pub context: *mut vg_context,
     /// A `vg_heading`. Default `VG_HEADING_AUTO`.
     pub heading: i32,
@@ -229,6 +230,10 @@ pub unsafe extern "C" fn vg_align_points(
             let from = points("world", world, "count", count, 3)?;
             let to = points("vehicle", vehicle, "count", count, 3)?;
             read::not_null("out", out, "where to put the alignment")?;
+            overlap::refuse(&[
+                Written::array("out_kept", out_kept, count),
+                Written::array("out_residuals", out_residuals, count),
+            ])?;
             let fit = Similarity::umeyama_robust(&from, &to)
                 .map_err(|e| read::renamed(e, &[("points", "world, vehicle")]))?;
             let found = vg_alignment {
@@ -294,7 +299,7 @@ impl vg_align_options {
         Told { callback: self.progress, user: self.progress_user }
     }
 
-    fn heading(&self) -> Result<Heading> {
+    pub(super) fn heading(&self) -> Result<Heading> {
         const HEADINGS: [(i32, &str, Heading); 3] = [
             (vg_heading::Auto as i32, "auto", Heading::Auto),
             (vg_heading::Forward as i32, "forward", Heading::Forward),

@@ -1,16 +1,21 @@
-//! What outlives a call: worker threads and the renderer's memory.
+//! What outlives a call: worker threads and the renderer's memory, in the caller's contexts and in the process's own.
 
 use super::guard::{clear, free, guarded, guarded_value};
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
 use crate::error::Result;
-use crate::progress::Threads;
 use crate::render::{CpuRenderer, Rendered, Rgba8};
-use std::sync::{Mutex, PoisonError};
+use crate::threads::{OfProcess, Threads};
+use std::process;
+use std::ptr::null_mut;
+use std::sync::atomic::{AtomicPtr, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Worker threads and scratch memory, made once and named in the options of calls, so that a call neither starts
 /// threads nor allocates what the last one had. Any number of threads may use one context at a time. Free it with
 /// `vg_context_free`, after the last call that uses it has returned; results do not depend on it.
+///
+/// In a fork, a context of the parent is `VG_STATUS_ARGUMENT`, and freeing it does nothing.
 #[cfg_attr(test, safer_ffi::derive_ReprC, repr(opaque))]
 pub struct vg_context {
     _private: [u8; 0],
@@ -23,7 +28,9 @@ pub struct vg_context {
 pub struct vg_context_options {
     /// `sizeof(vg_context_options)`.
     pub struct_size: usize,
-    /// Worker threads, 1 to 1024; 0: one per core. The calling thread waits while they work.
+    /// Threads that work, 1 to 1024; 0: one per core that the process may use, by its affinity and the quotas of its
+    /// control groups. 1 is the calling thread, and none is started; of more, all are started, and the calling thread
+    /// waits while they work. Default 0.
     pub threads: u32,
     /// Reserved: 0.
     pub flags: u32,
@@ -39,6 +46,9 @@ unsafe impl Versioned for vg_context_options {
 }
 
 /// What a `vg_context` points to.
+type ContextObject = OfProcess<Workshop>;
+
+/// What a call works with.
 pub(super) struct Workshop {
     pub(super) threads: Threads,
     pub(super) renderer: CpuRenderer,
@@ -73,14 +83,62 @@ impl<T: Default> Spare<T> {
     }
 }
 
-/// Runs `work` in the caller's context, or in one made for this call where it is NULL.
+/// The context of calls that name none.
+struct DefaultContext {
+    /// The process whose calls they are.
+    process: u32,
+    /// `None` before the first call, and after it was freed.
+    workshop: Mutex<Option<Arc<Workshop>>>,
+}
+
+impl DefaultContext {
+    /// That of this process. A fork begins with a new one: the parent's lock may have been held when it forked, and its
+    /// threads stayed in the parent.
+    fn here() -> &'static Self {
+        static HERE: AtomicPtr<DefaultContext> = AtomicPtr::new(null_mut());
+        let process = process::id();
+        loop {
+            let found = HERE.load(Ordering::Acquire);
+            // SAFETY: what was stored is never freed, and reached through shared references only.
+            match unsafe { found.as_ref() } {
+                Some(context) if context.process == process => return context,
+                _ => {}
+            }
+            let new = Box::into_raw(Box::new(Self { process, workshop: Mutex::default() }));
+            if HERE.compare_exchange(found, new, Ordering::AcqRel, Ordering::Acquire).is_err() {
+                // SAFETY: another thread was first; nobody has seen this one.
+                drop(unsafe { Box::from_raw(new) });
+            }
+        }
+    }
+
+    /// What calls work with, made by the first.
+    fn workshop(&self) -> Result<Arc<Workshop>> {
+        // A panic elsewhere leaves the one or none.
+        let mut held = self.workshop.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(workshop) = &*held {
+            return Ok(Arc::clone(workshop));
+        }
+        let made = Arc::new(Workshop::new(0)?);
+        *held = Some(Arc::clone(&made));
+        Ok(made)
+    }
+
+    fn free(&self) {
+        let held = self.workshop.lock().unwrap_or_else(PoisonError::into_inner).take();
+        // Not while holding the lock: threads are joined, unless a call still uses them.
+        drop(held);
+    }
+}
+
+/// Runs `work` in the caller's context, or in the process's own where it is NULL.
 pub(super) unsafe fn in_context<T>(
     context: *const vg_context,
     work: impl FnOnce(&Workshop) -> Result<T>,
 ) -> Result<T> {
-    match unsafe { context.cast::<Workshop>().as_ref() } {
-        Some(workshop) => work(workshop),
-        None => work(&Workshop::new(0)?),
+    match unsafe { context.cast::<ContextObject>().as_ref() } {
+        Some(context) => work(context.get("options.context")?),
+        None => work(&*DefaultContext::here().workshop()?),
     }
 }
 
@@ -109,22 +167,31 @@ pub unsafe extern "C" fn vg_context_new(
             read::zero("options.flags", options.flags == 0)?;
             let workshop = Workshop::new(options.threads as usize)
                 .map_err(|e| read::renamed(e, &[("threads", "options.threads")]))?;
-            out.write(Box::into_raw(Box::new(workshop)).cast());
+            out.write(Box::into_raw(Box::new(OfProcess::new(workshop))).cast());
             Ok(())
         })
     }
 }
 
-/// How many worker threads a context has. NULL: 0.
+/// How many threads work in a context. NULL, and in a fork of the process that made it: 0.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn vg_context_threads(context: *const vg_context) -> u32 {
     guarded_value(0, || {
-        unsafe { context.cast::<Workshop>().as_ref() }.map_or(0, |w| w.threads.count() as u32)
+        let context = unsafe { context.cast::<ContextObject>().as_ref() };
+        context.and_then(|context| context.get("context").ok()).map_or(0, |w| w.threads.count() as u32)
     })
 }
 
 /// Ends the context's threads and frees its memory. No call may be using it. NULL: nothing happens.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn vg_context_free(context: *mut vg_context) {
-    unsafe { free(context.cast::<Workshop>()) }
+    unsafe { free(context.cast::<ContextObject>()) }
+}
+
+/// Ends the threads and frees the memory that calls which name no context have made for each other. One that is running
+/// is not disturbed, and the last of them ends the threads; the next such call makes them anew. Nothing happens where
+/// there was no such call.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn vg_default_context_free() {
+    guarded_value((), || DefaultContext::here().free());
 }

@@ -5,6 +5,7 @@ use super::context::in_context;
 use super::gaussians::{self, vg_gaussians};
 use super::guard::guarded;
 use super::image::extent;
+use super::overlap::{self, Written};
 use super::read::{self, Versioned};
 use super::render::{Target, device, vg_alpha, vg_image_target, vg_render_options};
 use super::status::{vg_error, vg_status};
@@ -78,8 +79,8 @@ unsafe impl Versioned for vg_image_gradient {
 }
 
 /// Where `vg_render_backward` puts gradients: arrays of the caller's, laid out as those of `vg_gaussian_arrays`, at
-/// any address, NULL where not wanted. They are written whole, not added to. All numbers are finite: what a float32
-/// cannot hold is its largest number of that sign.
+/// any address, NULL where not wanted, no byte in two of them or in the target. They are written whole, not added to.
+/// All numbers are finite: what a float32 cannot hold is its largest number of that sign.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(test, safer_ffi::derive_ReprC)]
@@ -204,6 +205,8 @@ pub unsafe extern "C" fn vg_render_backward(
                 return Err(Error::argument("options.alpha", "0 (straight)", allowed));
             }
             let out = Arrays::read(out, gaussians)?;
+            let picture = target.as_ref().map_or(Vec::new(), |target| target.written("target"));
+            overlap::refuse(&[picture, out.written(gaussians)].concat())?;
             let mut of_picture =
                 PictureGradient { width: camera.width, height: camera.height, ..Default::default() };
             if planes.loss.is_none() {
@@ -381,6 +384,20 @@ impl Arrays {
             return Err(Error::argument("out.sh_degree", out.sh_degree.to_string(), allowed));
         }
         Ok(Self(out))
+    }
+
+    fn written(&self, gaussians: &Gaussians) -> Vec<Written> {
+        let (out, n) = (&self.0, gaussians.len());
+        vec![
+            Written::array("out.positions", out.positions, 3 * n),
+            Written::array("out.scales", out.scales, 3 * n),
+            Written::array("out.rotations", out.rotations, 4 * n),
+            Written::array("out.opacities", out.opacities, n),
+            Written::array("out.sh", out.sh, gaussians.sh().len()),
+            Written::array("out.background", out.background, 3),
+            Written::array("out.pose", out.pose, 6),
+            Written::array("out.view_matrix", out.view_matrix, 16),
+        ]
     }
 
     unsafe fn write(&self, from: &Gradients) {

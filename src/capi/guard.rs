@@ -2,7 +2,7 @@
 
 use super::status::{vg_error, vg_status};
 use crate::error::Error;
-use crate::progress::THREAD_NAME;
+use crate::threads::THREAD_NAME;
 use std::any::Any;
 use std::cell::Cell;
 use std::collections::VecDeque;
@@ -28,6 +28,7 @@ pub(super) unsafe fn guarded(
     out_error: *mut *mut vg_error,
     body: impl FnOnce() -> Result<(), Error>,
 ) -> vg_status {
+    let _errno = Errno::kept();
     unsafe { clear(out_error) };
     let Err(failure) = caught(body).and_then(|done| done.map_err(Failure::from)) else {
         return vg_status::Ok;
@@ -45,6 +46,7 @@ pub(super) unsafe fn guarded(
 
 /// Runs the body of a function that returns a value and cannot fail but by a bug; then it returns `fallback`.
 pub(super) fn guarded_value<T>(fallback: T, body: impl FnOnce() -> T) -> T {
+    let _errno = Errno::kept();
     caught(body).unwrap_or(fallback)
 }
 
@@ -62,6 +64,28 @@ pub(super) unsafe fn free<T>(handle: *mut T) {
             drop(unsafe { Box::from_raw(handle) });
         }
     });
+}
+
+/// Puts errno back: the calls of the system that the library makes are nothing to the caller.
+struct Errno {
+    #[cfg(unix)]
+    was: i32,
+}
+
+impl Errno {
+    fn kept() -> Self {
+        Self {
+            #[cfg(unix)]
+            was: nix::errno::Errno::last_raw(),
+        }
+    }
+}
+
+impl Drop for Errno {
+    fn drop(&mut self) {
+        #[cfg(unix)]
+        nix::errno::Errno::set_raw(self.was);
+    }
 }
 
 fn caught<T>(body: impl FnOnce() -> T) -> Result<T, Failure> {

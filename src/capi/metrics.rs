@@ -23,7 +23,7 @@ use std::ffi::c_void;
 pub struct vg_metrics_options {
     /// `sizeof(vg_metrics_options)`.
     pub struct_size: usize,
-    /// Threads and memory to use. NULL: made for this call, one thread per core.
+    /// Threads and memory to use. NULL: the process's own, one thread per core, see `vg_default_context_free`.
     pub context: *mut vg_context,
     /// A network that measures LPIPS, needed until the call returns. NULL: LPIPS is not measured.
     pub lpips: *const vg_model,

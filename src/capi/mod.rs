@@ -15,6 +15,7 @@
 #![allow(clippy::missing_safety_doc)]
 
 mod guard;
+mod overlap;
 mod read;
 
 mod version;

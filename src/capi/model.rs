@@ -83,7 +83,7 @@ unsafe impl Versioned for vg_model_options {
 }
 
 impl vg_model_options {
-    unsafe fn read(&self) -> Result<ModelOptions> {
+    pub(super) unsafe fn read(&self) -> Result<ModelOptions> {
         let providers = [
             (vg_provider::Cpu as i32, "cpu", Provider::Cpu),
             (vg_provider::Cuda as i32, "cuda", Provider::Cuda),

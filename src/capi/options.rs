@@ -113,7 +113,7 @@ pub type vg_log_fn = Option<unsafe extern "C" fn(level: i32, message: *const c_c
 pub struct vg_options {
     /// `sizeof(vg_options)`.
     pub struct_size: usize,
-    /// Threads and memory to use. NULL: made for this call, one thread per core.
+    /// Threads and memory to use. NULL: the process's own, one thread per core, see `vg_default_context_free`.
     pub context: *mut vg_context,
     /// A `vg_prior`. Default `VG_PRIOR_AUTO`.
     pub prior: i32,

@@ -6,6 +6,7 @@ use super::gaussians::{self, vg_gaussians};
 use super::guard::guarded;
 use super::image::{extent, vg_format};
 use super::options::{sh_degree, vg_progress_fn};
+use super::overlap::{self, Written};
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
 use super::watched::{Told, watched};
@@ -64,8 +65,7 @@ pub enum vg_depth_mode {
 pub struct vg_render_options {
     /// `sizeof(vg_render_options)`.
     pub struct_size: usize,
-    /// Threads and memory to use. NULL: made for this call, one thread per core; make one where pictures follow
-    /// each other.
+    /// Threads and memory to use. NULL: the process's own, one thread per core, see `vg_default_context_free`.
     pub context: *mut vg_context,
     /// A `vg_backend`. Default `VG_BACKEND_AUTO`. Where pictures follow each other a `vg_renderer` is faster: a graphics
     /// processor is sent the Gaussians once, and here with each call.
@@ -125,7 +125,8 @@ unsafe impl Versioned for vg_render_options {
     }
 }
 
-/// Where `vg_render` puts the picture: colour, depth, alpha, or several of them.
+/// Where `vg_render` puts the picture: colour, depth, alpha, or several of them, which share no byte; rows of one may
+/// lie in the gaps of another.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(test, safer_ffi::derive_ReprC)]
@@ -294,6 +295,8 @@ impl vg_render_options {
 
 /// The caller's memory, checked.
 pub(super) struct Target {
+    width: u32,
+    height: u32,
     color: Option<(*mut u8, usize, Pixel)>,
     depth: Option<(*mut u8, usize)>,
     alpha: Option<(*mut u8, usize)>,
@@ -378,12 +381,31 @@ impl Target {
         };
         let depth = plane(&named("depth"), target.depth, target.depth_row_stride)?;
         let alpha = plane(&named("alpha"), target.alpha, target.alpha_row_stride)?;
-        Ok(Self { color, depth, alpha })
+        let target = Self { width, height, color, depth, alpha };
+        overlap::refuse(&target.written(argument))?;
+        Ok(target)
+    }
+
+    /// What is written of it.
+    pub(super) fn written(&self, argument: &str) -> Vec<Written> {
+        let plane = |name: &str, first: *mut u8, stride: usize, bytes: usize| Written {
+            argument: format!("{argument}.{name}"),
+            first: first.addr(),
+            row: self.width as usize * bytes,
+            stride,
+            rows: self.height as usize,
+        };
+        let color =
+            self.color.map(|(first, stride, pixel)| plane("color", first, stride, pixel.layout.bytes()));
+        let floats = |name, (first, stride)| plane(name, first, stride, size_of::<f32>());
+        let depth = self.depth.map(|depth| floats("depth", depth));
+        let alpha = self.alpha.map(|alpha| floats("alpha", alpha));
+        [color, depth, alpha].into_iter().flatten().collect()
     }
 
     /// Whether bytes are all that is wanted, and [`Rgba8`](crate::render::Rgba8) has them.
     pub(super) fn takes_bytes(&self) -> bool {
-        let Self { color: Some((_, _, pixel)), depth: None, alpha: None } = self else { return false };
+        let Self { color: Some((_, _, pixel)), depth: None, alpha: None, .. } = self else { return false };
         pixel.layout != Layout::Rgba32f && (pixel.opaque || pixel.alpha == vg_alpha::Straight)
     }
 

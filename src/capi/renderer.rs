@@ -4,6 +4,7 @@ use super::camera::{self, vg_camera};
 use super::context::{in_context, vg_context};
 use super::gaussians::{self, vg_gaussians};
 use super::guard::{clear, free, guarded, guarded_value};
+use super::overlap;
 use super::read::{self, Versioned};
 use super::render::{Target, backend, vg_backend, vg_image_target, vg_render_options};
 use super::status::{c_string, vg_error, vg_status};
@@ -27,7 +28,7 @@ pub struct vg_renderer {
 pub struct vg_renderer_options {
     /// `sizeof(vg_renderer_options)`.
     pub struct_size: usize,
-    /// Threads to make ready with. NULL: made for this call, one per core.
+    /// Threads to make ready with. NULL: the process's own, one per core, see `vg_default_context_free`.
     pub context: *mut vg_context,
     /// A `vg_backend`. Default `VG_BACKEND_AUTO`: a graphics processor where this build and this machine have one and
     /// there are 20,000 Gaussians or more, else the CPU; should the device fail later, the CPU goes on.
@@ -108,8 +109,8 @@ pub unsafe extern "C" fn vg_renderer_new(
 /// - cameras: `count` of them, not NULL.
 /// - count: 1 to 4096.
 /// - options: NULL for the default values. `backend` is not looked at: the renderer has one.
-/// - targets: `count` of them, not NULL. The memory they point to is written when its picture is done; the arguments of
-///   all pictures are checked before the first is drawn.
+/// - targets: `count` of them, not NULL, no byte of memory in two. The memory they point to is written when its picture
+///   is done; the arguments of all pictures are checked before the first is drawn.
 /// - out_error: NULL, or receives the error.
 ///
 /// The same arguments give the same bytes with any number of threads on one machine; those of a graphics processor
@@ -142,6 +143,9 @@ pub unsafe extern "C" fn vg_renderer_render(
                 places.push(Target::read(&name, target, &settings, alpha, width, height)?);
                 seen.push(camera);
             }
+            let written =
+                places.iter().enumerate().flat_map(|(i, place)| place.written(&format!("targets[{i}]")));
+            overlap::refuse(&written.collect::<Vec<_>>())?;
             let ready = &object.ready;
             // Of the CPU's planes the bytes are made on the way to the target.
             let as_bytes = ready.choice().backend == Backend::Gpu && places.iter().all(Target::takes_bytes);

@@ -202,7 +202,7 @@ unsafe impl Versioned for vg_report_figures {
 }
 
 impl vg_report_figures {
-    fn of(report: &Report) -> Self {
+    pub(super) fn of(report: &Report) -> Self {
         let prior = match report.prior {
             "given" => vg_prior::Given,
             "hull" => vg_prior::Hull,

@@ -35,7 +35,7 @@ struct SceneObject {
 pub struct vg_scene_options {
     /// `sizeof(vg_scene_options)`.
     pub struct_size: usize,
-    /// Threads that decode. NULL: made for this call, one thread per core.
+    /// Threads that decode. NULL: the process's own, one per core, see `vg_default_context_free`.
     pub context: *mut vg_context,
     /// 16 numbers, a row-major 4x4 similarity from the world of the poses to the vehicle's frame in metres. A COLMAP
     /// model needs it. NULL for a `transforms.json`: its world is the vehicle's frame.
@@ -158,7 +158,7 @@ unsafe fn open(
 }
 
 impl vg_scene_options {
-    unsafe fn read(&self) -> Result<SceneOptions> {
+    pub(super) unsafe fn read(&self) -> Result<SceneOptions> {
         read::zero("options.flags", self.flags == 0)?;
         let vehicle_from_world = match self.vehicle_from_world.is_null() {
             true => None,

@@ -19,7 +19,7 @@ use crate::scene::{Mask, Segmenter};
 pub struct vg_segment_options {
     /// `sizeof(vg_segment_options)`.
     pub struct_size: usize,
-    /// Threads to use. NULL: made for this call, one per core; make one where pictures follow each other.
+    /// Threads to use. NULL: the process's own, one per core, see `vg_default_context_free`.
     pub context: *mut vg_context,
     /// Reserved: 0.
     pub flags: u64,

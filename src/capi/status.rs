@@ -27,6 +27,8 @@ pub enum vg_status {
     Internal = 7,
     /// What was asked for needs something that this machine does not have: ONNX Runtime, a device.
     Missing = 8,
+    /// The operating system did not start the threads that were asked for.
+    Threads = 9,
 }
 
 /// Why a call failed. Owned by the caller, who frees it with `vg_error_free`; it never changes, and any thread may
@@ -74,6 +76,7 @@ impl From<&Error> for vg_status {
             Error::Cancelled { .. } => Self::Cancelled,
             Error::NotBuilt { .. } => Self::NotBuilt,
             Error::Missing { .. } => Self::Missing,
+            Error::Threads { .. } => Self::Threads,
         }
     }
 }
@@ -96,7 +99,7 @@ pub(super) fn c_string(text: String) -> CString {
 }
 
 impl vg_status {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 10] = [
         Self::Ok,
         Self::Argument,
         Self::Format,
@@ -106,6 +109,7 @@ impl vg_status {
         Self::NotBuilt,
         Self::Internal,
         Self::Missing,
+        Self::Threads,
     ];
 
     /// Its name in C.
@@ -120,6 +124,7 @@ impl vg_status {
             Self::NotBuilt => c"VG_STATUS_NOT_BUILT",
             Self::Internal => c"VG_STATUS_INTERNAL",
             Self::Missing => c"VG_STATUS_MISSING",
+            Self::Threads => c"VG_STATUS_THREADS",
         }
     }
 }

@@ -2,10 +2,12 @@
 
 #[path = "../../tests/abi/contents.rs"]
 mod contents;
+mod meaning;
 #[path = "../../tests/abi/tools.rs"]
 mod tools;
 
 use super::guard::{guarded, injection};
+use super::read::Versioned;
 use super::*;
 use crate::progress::Threads;
 use contents::Contents;
@@ -106,16 +108,21 @@ fn rust_sees_the_golden_layout() {
     }
 }
 
+/// What C calls a variant of an enumeration: `VG_KEEP_SH_BANDS` of `vg_keep` and `ShBands`.
+fn enumerator(enumeration: &str, variant: &str) -> String {
+    let word = |(i, c): (usize, char)| match c.is_ascii_uppercase() && i > 0 {
+        true => format!("_{c}"),
+        false => c.to_ascii_uppercase().to_string(),
+    };
+    let name: String = variant.chars().enumerate().map(word).collect();
+    format!("{}_{name}", enumeration.to_ascii_uppercase())
+}
+
 /// Every enumerator with its number, named as C names it.
 fn numbers_of_rust() -> BTreeSet<String> {
     let mut lines = BTreeSet::new();
-    let mut note = |prefix: &str, variant: &str, number: i32| {
-        let word = |(i, c): (usize, char)| match c.is_ascii_uppercase() && i > 0 {
-            true => format!("_{c}"),
-            false => c.to_ascii_uppercase().to_string(),
-        };
-        let name: String = variant.chars().enumerate().map(word).collect();
-        lines.insert(format!("{}_{name} = {number}", prefix.to_ascii_uppercase()));
+    let mut note = |enumeration: &str, variant: &str, number: i32| {
+        lines.insert(format!("{} = {number}", enumerator(enumeration, variant)));
     };
     macro_rules! number {
         ($($name:ident { $($variant:ident)* })*) => {
@@ -139,7 +146,7 @@ fn numbers_of_rust() -> BTreeSet<String> {
         vg_provider { Cpu Cuda }
         vg_refine_stop { Done HeldOut Diverged Unseen }
         vg_relight { Auto Never }
-        vg_status { Ok Argument Format Io Reconstruction Cancelled NotBuilt Internal Missing }
+        vg_status { Ok Argument Format Io Reconstruction Cancelled NotBuilt Internal Missing Threads }
         vg_symmetry { Auto Always Never Flip }
         vg_verdict { Good Unchecked Doubtful Bad }
     }
@@ -262,6 +269,7 @@ fn every_function() -> Vec<(&'static str, Call)> {
         vg_context_new(null(), null_mut()) reports;
         vg_context_threads(null()) value;
         vg_context_free(null_mut()) none;
+        vg_default_context_free() none;
         vg_camera_init(null_mut(), 0) status;
         vg_camera_from_colmap_model(0, null(), 0, 0, 0, null(), null_mut()) reports;
         vg_camera_from_opencv(null(), null(), 0, 0, 0, 0, null(), null_mut()) reports;

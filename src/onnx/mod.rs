@@ -17,6 +17,7 @@ pub(crate) use ports::Broken;
 pub use ports::{Port, Ports};
 
 use crate::error::{Error, Result};
+use crate::threads::OfProcess;
 use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -103,7 +104,7 @@ pub struct Model {
 struct Inner {
     path: PathBuf,
     ports: Ports,
-    session: Mutex<backend::Session>,
+    session: OfProcess<Mutex<backend::Session>>,
 }
 
 /// A tensor lent to a run.
@@ -143,7 +144,8 @@ impl Model {
             return Err(Error::argument("model", format!("{}, no file", path.display()), "an ONNX file"));
         }
         let (session, ports) = backend::Session::open(path, options)?;
-        Ok(Self { inner: Arc::new(Inner { path: path.to_owned(), ports, session: Mutex::new(session) }) })
+        let session = OfProcess::new(Mutex::new(session));
+        Ok(Self { inner: Arc::new(Inner { path: path.to_owned(), ports, session }) })
     }
 
     /// The file.
@@ -158,8 +160,11 @@ impl Model {
 
     /// Runs the model. The outputs are in the order of [`Ports::outputs`]; those that are not float32 tensors are
     /// `None`.
+    ///
+    /// # Errors
+    /// [`Error::Format`] where the runtime fails, [`Error::Argument`] in a fork of the process that opened the model.
     pub fn run(&self, inputs: &[Input]) -> Result<Vec<Option<Tensor>>> {
-        let mut session = self.inner.session.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut session = self.inner.session.get("model")?.lock().unwrap_or_else(PoisonError::into_inner);
         session.run(inputs).map_err(|reason| self.broken("run", reason))
     }
 

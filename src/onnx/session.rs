@@ -2,6 +2,7 @@
 
 use super::{Input, ModelOptions, Port, Ports, Provider, Tensor, runtime};
 use crate::error::{Error, Result};
+use crate::threads::without_signals;
 use ort::ep;
 use ort::logging::LogLevel;
 use ort::session::SessionInputValue;
@@ -74,7 +75,7 @@ fn built(path: &Path, options: &ModelOptions) -> Result<ort::session::Session> {
         found: words(&ort::Error::<()>::from(e)),
         remedy: "install onnxruntime-gpu and name its library, or run on the processor".into(),
     })?;
-    builder.commit_from_file(path).map_err(broken)
+    without_signals(|| builder.commit_from_file(path)).map_err(broken)
 }
 
 /// Of the model and of the files beside it whose names begin with its own, where exporters put large weights.

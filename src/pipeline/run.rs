@@ -73,6 +73,7 @@ pub fn reconstruct_on<'a>(
     options: &Options,
     progress: &'a mut ProgressCallback<'a>,
 ) -> Result<Reconstruction> {
+    threads.check_process()?;
     options.validate()?;
     scene.validate()?;
     let context = Context::new(threads, progress);

@@ -59,7 +59,7 @@ impl Watch {
 impl Threads {
     /// Runs `work` on these threads, while `callback` is called on the calling one: at the start, about every
     /// [`ASKED_EVERY`], and with a fraction of 1 at the end. `Break` ends the call with [`Error::Cancelled`] as soon as
-    /// the work looks at its watch.
+    /// the work looks at its watch. One thread that is the calling one gets a second for this call.
     pub fn run_watched<T: Send>(
         &self,
         stage: &'static str,
@@ -72,21 +72,21 @@ impl Threads {
             watch.check()?;
         }
         let (running, ended) = mpsc::channel::<()>();
-        let mut done = None;
-        let slot = &mut done;
-        self.pool().in_place_scope(|scope| {
-            scope.spawn(move |_| {
-                *slot = Some(work(watch));
+        let done = self.run_beside(
+            move || {
+                let done = work(watch);
                 // Of work that panics it is dropped as well.
                 drop(running);
-            });
-            while ended.recv_timeout(ASKED_EVERY) == Err(RecvTimeoutError::Timeout) {
-                if !watch.is_stopped() && callback(watch.progress()).is_break() {
-                    watch.stop();
+                done
+            },
+            || {
+                while ended.recv_timeout(ASKED_EVERY) == Err(RecvTimeoutError::Timeout) {
+                    if !watch.is_stopped() && callback(watch.progress()).is_break() {
+                        watch.stop();
+                    }
                 }
-            }
-        });
-        let done = done.expect("the scope ends after the work");
+            },
+        )?;
         watch.check()?;
         let done = done?;
         if callback(Progress { stage, fraction: 1.0, overall: 1.0, loss: None }).is_break() {

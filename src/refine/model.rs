@@ -34,6 +34,7 @@ pub fn model_on<'a>(
     options: &RefineOptions,
     progress: &'a mut ProgressCallback<'a>,
 ) -> Result<(Gaussians, Refinement)> {
+    threads.check_process()?;
     if gaussians.is_empty() {
         return Err(Error::argument("gaussians", "none", "at least one"));
     }

@@ -43,8 +43,12 @@ struct Table {
 
 impl Table {
     fn new() -> Self {
+        Self::on_threads(2)
+    }
+
+    fn on_threads(threads: u32) -> Self {
         let folder = scratch();
-        let world = World::new(&root().join("tests/data/sedan"), folder.path());
+        let world = World::on_threads(threads, &root().join("tests/data/sedan"), folder.path());
         Self { world, rows: 0, functions: BTreeSet::new(), _folder: folder }
     }
 
@@ -195,7 +199,7 @@ fn expected(outcome: Outcome, words: String) -> Expect {
 const SIZED: [&str; 2] = ["vg_report_get_figures", "vg_scene_get_view"];
 
 /// Functions that cannot fail, all called by `what_cannot_fail_accepts_null`.
-const NEVER_FAIL: [&str; 29] = [
+const NEVER_FAIL: [&str; 30] = [
     "vg_version",
     "vg_abi_version",
     "vg_status_name",
@@ -204,6 +208,7 @@ const NEVER_FAIL: [&str; 29] = [
     "vg_error_free",
     "vg_context_threads",
     "vg_context_free",
+    "vg_default_context_free",
     "vg_report_json",
     "vg_report_reason",
     "vg_report_point_count",
@@ -270,6 +275,7 @@ fn what_cannot_fail_accepts_null() {
         vg_renderer_free(null_mut());
         vg_error_free(null_mut());
         vg_context_free(null_mut());
+        vg_default_context_free();
         vg_report_free(null_mut());
         vg_gaussians_free(null_mut());
         vg_scene_free(null_mut());
@@ -441,8 +447,11 @@ fn numbers_that_overflow_are_refused_and_not_handed_out() {
     table.row(calls::pose_from_opencv, "far, then scaled", tvec, refused("pose"));
     let turned = |call: &mut Call| call.doubles("rvec").fill(far);
     table.row(calls::pose_from_opencv, "no angle", turned, refused("rvec"));
-    let depth = |call: &mut Call| call.set("depth_m", Value::Number(far.to_bits()));
-    table.row(calls::camera_unproject, "beyond all numbers", depth, refused("pixel"));
+    let beyond = |call: &mut Call| {
+        call.set("depth_m", Value::Number(far.to_bits()));
+        call.doubles("pixel")[0] = 1e300;
+    };
+    table.row(calls::camera_unproject, "beyond all numbers", beyond, refused("pixel"));
 
     // A float32 of 16 km does not resolve a millimetre.
     let utm = |call: &mut Call| call.doubles("to_from_vehicle")[3] = 5e6;
@@ -475,7 +484,7 @@ fn points_without_a_pixel_and_pixels_without_a_point_are_nan_between_the_others(
     call.set("points", Value::Doubles(given.concat()));
     call.set("count", Value::Number(4));
     // Room that holds no finite numbers is not the table's kind of argument.
-    let (mut pixels, mut depths) = ([7.0; 8], [7.0; 4]);
+    let (mut pixels, mut depths) = ([7.0f64; 8], [7.0f64; 4]);
     call.set("out_pixels", Value::Handle(pixels.as_mut_ptr().expose_provenance()));
     call.set("out_depths", Value::Handle(depths.as_mut_ptr().expose_provenance()));
     assert!(call.run(true).is_ok());
@@ -487,7 +496,7 @@ fn points_without_a_pixel_and_pixels_without_a_point_are_nan_between_the_others(
     call.set("pixels", Value::Doubles(pixels.to_vec()));
     call.set("depths", Value::Doubles(depths.to_vec()));
     call.set("count", Value::Number(4));
-    let mut points = [7.0; 12];
+    let mut points = [7.0f64; 12];
     call.set("out_points", Value::Handle(points.as_mut_ptr().expose_provenance()));
     assert!(call.run(true).is_ok());
     assert!(points[3..9].iter().all(|v| v.is_nan()));
@@ -1692,6 +1701,8 @@ fn alone_threads_end_with_their_context() {
     let table = Table::new();
     let here = threads();
     assert_eq!(here, before + 2, "the world's context");
+    let cores = std::thread::available_parallelism().unwrap().get();
+    let of_the_process = if cores == 1 { 0 } else { cores };
     for _ in 0..3 {
         let mut call = calls::context_new(&table.world);
         call.lent("options").put("threads", 0, 7);
@@ -1704,17 +1715,66 @@ fn alone_threads_end_with_their_context() {
             calls::render,
             calls::render_backward_with_a_picture,
             calls::transforms_open,
+            calls::renderer_new,
+            calls::renderer_render,
+            calls::metrics_pictures,
+            calls::metrics_view,
+            calls::metrics_surface,
+            calls::align_scan,
+            calls::colmap_open,
         ] {
             let mut call = make(&table.world);
             call.lent("options").put("context", 0, 0);
             assert!(call.run(true).is_ok());
-            assert_eq!(threads_left(here), here, "{} without context ends its threads", call.function);
+            assert_eq!(threads(), here + of_the_process, "{} uses the process's context", call.function);
         }
+        unsafe { vg_default_context_free() };
+        assert_eq!(threads_left(here), here, "vg_default_context_free ends its threads");
         assert!(calls::gaussians_transform(&table.world).run(true).is_ok());
-        assert_eq!(threads_left(here), here);
+        assert_eq!(threads(), here, "moving Gaussians needs none");
     }
     drop(table);
     assert_eq!(threads_left(before), before);
+}
+
+/// Run alone, in a process that starts no thread, by the test below.
+#[cfg(target_os = "linux")]
+#[test]
+#[ignore = "starts no thread"]
+fn alone_one_thread_is_the_calling_one() {
+    let mut table = Table::on_threads(1);
+    let here = threads();
+    for make in calls::CALLS {
+        table.row(make, "on this thread", |_| {}, Fine);
+    }
+    assert_eq!(threads(), here);
+    let two = |call: &mut Call| call.lent("options").put("threads", 0, 2);
+    let words = "threads: 0 of 2 could be started: Resource temporarily unavailable (os error 11); raise the system's \
+                 limit of threads (ulimit -u), or ask for 1, which starts none";
+    table.row(calls::context_new, "two threads", two, Fails(vg_status::Threads, words.into()));
+    // One core is one thread, which is there.
+    let cores = std::thread::available_parallelism().unwrap().get();
+    let words = format!("threads: 0 of {cores} could be started");
+    let expect = if cores == 1 { Fine } else { Fails(vg_status::Threads, words) };
+    for make in [calls::render as fn(&World) -> Call, calls::transforms_open, calls::reconstruct] {
+        let none = |call: &mut Call| call.lent("options").put("context", 0, 0);
+        table.row(make, "the process's context", none, expect.clone());
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_context_of_one_thread_works_where_no_thread_can_be_started() {
+    if !crate::tools::have(&crate::tools::cc(), "gcc", "a system that starts no thread") {
+        return;
+    }
+    let folder = scratch();
+    let mut command = std::process::Command::new(std::env::current_exe().unwrap());
+    let name = "arguments::alone_one_thread_is_the_calling_one";
+    command.args(["--exact", name, "--ignored", "--test-threads=1"]);
+    command.env("LD_PRELOAD", crate::tools::few_threads(folder.path())).env("VG_TEST_THREADS", "0");
+    let said = crate::tools::run(&mut command);
+    assert!(said.contains("1 passed"), "{said}");
 }
 
 #[cfg(target_os = "linux")]

@@ -131,7 +131,7 @@ fn valgrind_finds_no_error_and_no_leak_in_the_client() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn the_library_can_be_unloaded_and_leaves_no_thread() {
+fn a_thread_may_end_after_it_unloaded_the_library_which_leaves_no_thread() {
     if !have(&cc(), "gcc", "unloading the library") {
         return;
     }
@@ -140,6 +140,20 @@ fn the_library_can_be_unloaded_and_leaves_no_thread() {
     let program = folder.path().join("reload");
     let mut command = Command::new(cc());
     command.args(STRICT).arg("-I").arg(root().join("include")).arg(root().join("tests/abi/reload.c"));
-    run(command.arg("-o").arg(&program).arg("-ldl"));
-    run(Command::new(program).arg(target().join("libvg.so")));
+    run(command.arg("-o").arg(&program).args(["-ldl", "-pthread"]));
+    run(Command::new(program).arg(target().join("libvg.so")).arg(sample()).arg(folder.path()));
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_fork_is_told_of_its_parents_contexts_and_works_without_them() {
+    if !have(&cc(), "gcc", "forks") {
+        return;
+    }
+    let folder = scratch();
+    library_folder(folder.path());
+    let mut flags = STRICT.to_vec();
+    flags.push("-std=gnu11");
+    let source = root().join("tests/abi/fork.c");
+    run(&mut Command::new(compile(&cc(), &flags, &root().join("include"), &source, folder.path(), "fork")));
 }

@@ -9,6 +9,8 @@
 //! | a field moved or resized, an enumerator's number | `layout`, and a second witness in `src/capi/tests.rs` |
 //! | a parameter's or field's type | `abidiff` |
 //! | the name a program asks the loader for | `soname` |
+//! | a default | `defaults` |
+//! | what a number means | `meaning`, and its namesake `src/capi/tests/meaning.rs` |
 //! | what a call does | `client`, a program compiled against the header of its release |
 //! | what comes out of it | `buffers` |
 //! | what it does with bad arguments | `arguments` |
@@ -28,9 +30,11 @@ mod client;
 #[path = "../common/mod.rs"]
 mod common;
 mod contents;
+mod defaults;
 mod gradients;
 mod header;
 mod layout;
+mod meaning;
 mod pictures;
 mod symbols;
 mod tools;

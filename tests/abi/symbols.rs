@@ -44,6 +44,16 @@ fn the_library_answers_to_its_soname() {
     assert!(dynamic.contains("Library soname: [libvg.so.0]"), "{dynamic}");
 }
 
+/// What runs when a thread ends, after the host may have unloaded the library, is still there.
+#[test]
+fn the_library_stays_in_memory_when_it_is_unloaded() {
+    if !have("readelf", "binutils", "the flags of the library") {
+        return;
+    }
+    let dynamic = run(Command::new("readelf").args(["-d", "-W"]).arg(target().join("libvg.so")));
+    assert!(dynamic.lines().any(|line| line.contains("(FLAGS_1)") && line.contains("NODELETE")), "{dynamic}");
+}
+
 #[test]
 fn the_library_needs_nothing_but_the_system() {
     if !have("readelf", "binutils", "needed libraries") {

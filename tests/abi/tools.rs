@@ -99,6 +99,15 @@ pub fn compile(
     program
 }
 
+/// A library to preload that has a process start at most `VG_TEST_THREADS` threads.
+pub fn few_threads(folder: &Path) -> PathBuf {
+    let library = folder.join("few_threads.so");
+    let mut command = Command::new(cc());
+    command.args(STRICT).args(["-std=gnu11", "-shared", "-fPIC"]);
+    run(command.arg(root().join("tests/common/few_threads.c")).arg("-o").arg(&library).arg("-ldl"));
+    library
+}
+
 /// Compares with a golden file, or rewrites it under `VG_BLESS`. `why` says what a difference means.
 pub fn assert_golden(path: &Path, found: &str, why: &str) {
     if std::env::var_os("VG_BLESS").is_some() {

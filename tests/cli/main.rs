@@ -11,6 +11,11 @@ mod reconstruct;
 mod refine;
 mod render;
 mod report;
+#[cfg(target_os = "linux")]
+mod threads;
+#[cfg(target_os = "linux")]
+#[path = "../abi/tools.rs"]
+mod tools;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -29,7 +34,11 @@ struct Run {
 
 /// Runs the program in the sample's folder.
 fn vg<S: AsRef<std::ffi::OsStr>>(args: &[S]) -> Run {
-    let done = Command::new(env!("CARGO_BIN_EXE_vg")).args(args).current_dir(sample()).output().unwrap();
+    ran(Command::new(env!("CARGO_BIN_EXE_vg")).args(args).current_dir(sample()))
+}
+
+fn ran(command: &mut Command) -> Run {
+    let done = command.output().unwrap();
     Run {
         code: done.status.code().expect("ended by itself"),
         out: String::from_utf8_lossy(&done.stdout).into_owned(),

@@ -33,6 +33,7 @@ CLASSES: list[tuple[Status, str, type[vg.VgError], type[Exception]]] = [
     (Status.NOT_BUILT, "backend: gpu", vg.NotBuiltError, NotImplementedError),
     (Status.INTERNAL, "internal error: none", vg.InternalError, RuntimeError),
     (Status.MISSING, "driver: none", vg.MissingError, RuntimeError),
+    (Status.THREADS, "threads: 1 of 2 were started", vg.ThreadsError, RuntimeError),
 ]
 
 

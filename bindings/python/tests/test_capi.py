@@ -281,6 +281,25 @@ def test_a_context_is_shared_between_calls_and_threads(ellipsoid: Views, made: v
     assert len(pictures) == 4 and all((p == expected).all() for p in pictures)
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_a_fork_is_told_of_its_parents_context_and_works_without_one(ellipsoid: Views) -> None:
+    context = capi.Context(threads=2)
+    made = capi.reconstruct(ellipsoid.images, ellipsoid.masks, ellipsoid.cameras, ellipsoid.depths, context=context)
+    car, camera = made.gaussians, ellipsoid.cameras[0]
+    expected = car.render(camera)
+    child = os.fork()
+    if child == 0:
+        signal.alarm(60)
+        try:
+            car.render(camera, context=context)
+        except vg.VgError as error:
+            told = error.code is vg.Status.ARGUMENT and "is a fork" in str(error)
+        else:
+            told = False
+        os._exit(0 if told and (car.render(camera) == expected).all() else 1)
+    assert os.waitpid(child, 0)[1] == 0
+
+
 def test_progress_cancels_logs_and_passes_exceptions_through(ellipsoid: Views) -> None:
     views = (ellipsoid.images, ellipsoid.masks, ellipsoid.cameras)
     stages: list[str] = []

@@ -28,6 +28,7 @@ def test_numbers_are_those_of_the_c_library() -> None:
         ("NOT_BUILT", 6),
         ("INTERNAL", 7),
         ("MISSING", 8),
+        ("THREADS", 9),
     ]
 
 

@@ -111,6 +111,14 @@ for call in calls:
     assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", "")
 
 
+@pytest.mark.skipif(sys.platform != "linux" or shutil.which("readelf") is None, reason="readelf reads ELF")
+def test_both_libraries_stay_in_memory_when_they_are_unloaded() -> None:
+    # A thread that called one of them runs its destructors when it ends, which may be later.
+    for library in (Path(vg._native.__file__), capi.library_path()):
+        read = subprocess.run(["readelf", "-d", "-W", str(library)], capture_output=True, text=True, check=True)
+        assert any("(FLAGS_1)" in line and "NODELETE" in line for line in read.stdout.splitlines()), library
+
+
 def test_everything_public_has_a_docstring() -> None:
     for name in vg.__all__:
         thing = getattr(vg, name)

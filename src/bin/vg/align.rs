@@ -10,6 +10,7 @@ use vg::Error;
 use vg::align::{Heading, ScanAlignment, folder_to_scan, masks_of, scan_of, to_box};
 use vg::geometry::Similarity;
 use vg::io::{self, FitQuality, MaskedViews};
+use vg::progress::Threads;
 
 /// Fewer centres leave the turn about their line open.
 const FEWEST: usize = 3;
@@ -35,9 +36,7 @@ pub(crate) fn run(args: &AlignArgs) -> Result {
         Mode::Centers(path) | Mode::Matrix(path) => Some(path.to_owned()),
     };
     files::refuse_clashes(std::slice::from_ref(&args.output), input.as_slice())?;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
-    let pool = pool.map_err(|e| Failure::job(format!("--threads {}: {e}", args.threads)))?;
-    let found = pool.install(|| match mode {
+    let found = Threads::new(args.threads)?.run(|| match mode {
         Mode::Scan(_) => by_scan(args, scan.as_deref().unwrap_or(Path::new(""))),
         Mode::Centers(path) => by_centers(args, path),
         Mode::Box(size) => by_box(args, size),
@@ -56,8 +55,13 @@ pub(crate) fn run(args: &AlignArgs) -> Result {
 }
 
 /// The similarity to a scan, of a file or of the scene's folder, and the masks it was found with.
-pub(crate) fn to_scan_of(scene: &Path, scan: Option<&Path>, heading: Heading) -> Result<ScanAlignment> {
-    Ok(by_masks(scene, scan, heading)?.1)
+pub(crate) fn to_scan_of(
+    scene: &Path,
+    scan: Option<&Path>,
+    heading: Heading,
+    threads: &Threads,
+) -> Result<ScanAlignment> {
+    Ok(threads.run(|| by_masks(scene, scan, heading))?.1)
 }
 
 fn by_masks(path: &Path, scan: Option<&Path>, heading: Heading) -> Result<(MaskedViews, ScanAlignment)> {

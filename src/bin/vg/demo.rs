@@ -11,6 +11,7 @@ use std::path::Path;
 use vg::View;
 use vg::io::{SceneOptions, ply};
 use vg::pipeline::{Options, PriorChoice};
+use vg::progress::Threads;
 use vg::render::{RenderOptions, Rendered};
 
 /// Four photographs of the right side in; the model, its left side and the errors there out.
@@ -27,11 +28,12 @@ pub(crate) fn run(args: &DemoArgs) -> Result {
     let without_depth = SceneOptions { load_depth: false, ..SceneOptions::default() };
     let shape =
         Options { prior: PriorChoice::Shape, threads: args.threads, points: true, ..Options::default() };
-    let inputs = scene::open(&scene_folder, &split.input, &without_depth)?;
-    let made = reconstruct::reconstruct(&inputs.scene, &shape)?;
+    let threads = Threads::new(args.threads)?;
+    let inputs = scene::open(&scene_folder, &split.input, &without_depth, &threads)?;
+    let made = reconstruct::reconstruct(&inputs.scene, &shape, &threads)?;
 
-    let tests = scene::open(&scene_folder, &split.test, &without_depth)?;
-    let (drawn, mut measured) = measure::judge(&made.gaussians, &tests.scene.views, args.threads)?;
+    let tests = scene::open(&scene_folder, &split.test, &without_depth, &threads)?;
+    let (drawn, mut measured) = measure::judge(&made.gaussians, &tests.scene.views, &threads)?;
     measured.reconstruct_ms = Some(made.report.total_ms);
     ply::write(&folder.join("asset.ply"), &made.gaussians)?;
     if let Some(cloud) = &made.points {
@@ -51,7 +53,7 @@ pub(crate) fn run(args: &DemoArgs) -> Result {
 
     let given = Options { prior: PriorChoice::Given, ..shape.clone() };
     let shown = Shown::plain(&scene_folder, &without_depth);
-    let bound = measure::split(&shown, &split, &given, &OfVehicle::default())?;
+    let bound = measure::split(&shown, &split, &given, &OfVehicle::default(), &threads)?;
     Ok(Outcome::done(text(folder, &split, &measured, &bound)))
 }
 

@@ -33,11 +33,12 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
     files::refuse_clashes(&outputs, &read)?;
     outputs.iter().try_for_each(|path| files::prepare(path))?;
 
-    let mut opened = scene::load(index)?;
-    let masks_by = fill_masks(args, &mut opened.scene.views)?;
+    let threads = Threads::new(args.method.threads)?;
+    let mut opened = scene::load(index, &threads)?;
+    let masks_by = fill_masks(args, &mut opened.scene.views, &threads)?;
     opened.scene.cloud = args.method.cloud.as_deref().map(cloud::read).transpose()?;
     let settings = Options { points: args.points.is_some(), check: !args.no_check, ..args.method.options()? };
-    let made = reconstruct(&opened.scene, &settings)?;
+    let made = reconstruct(&opened.scene, &settings, &threads)?;
     note_warnings(&made.report);
     accept(&made.report, &args.strict)?;
     ply::write(&args.output, &made.gaussians)?;
@@ -91,14 +92,14 @@ pub(crate) fn verdict(verdict: Verdict) -> &'static str {
 }
 
 /// Masks of a network for the views that have none, and what to say of it. The network is opened only then.
-fn fill_masks(args: &ReconstructArgs, views: &mut [View]) -> Result<String> {
+fn fill_masks(args: &ReconstructArgs, views: &mut [View], threads: &Threads) -> Result<String> {
     let Some(path) = &args.mask_model else { return Ok(String::new()) };
     if views.iter().all(|view| view.mask.is_some()) {
         note(&format!("{}: not opened, every view has a mask", path.display()));
         return Ok(String::new());
     }
     let segmenter = Segmenter::new(Model::open(path, &args.method.model_options())?)?;
-    let filled = Threads::new(args.method.threads)?.run(|| segmenter.fill(views))?;
+    let filled = threads.run(|| segmenter.fill(views))?;
     for view in views.iter().filter(|v| v.mask.as_ref().is_some_and(|m| m.vehicle_pixels() == 0)) {
         note(&format!("{}: no vehicle pixel in its mask", view.name));
     }
@@ -106,9 +107,9 @@ fn fill_masks(args: &ReconstructArgs, views: &mut [View]) -> Result<String> {
 }
 
 /// With progress on a terminal.
-pub(crate) fn reconstruct(scene: &Scene, options: &Options) -> Result<Reconstruction> {
+pub(crate) fn reconstruct(scene: &Scene, options: &Options, threads: &Threads) -> Result<Reconstruction> {
     let bar = Bar::of_reconstruction();
-    Ok(pipeline::reconstruct(scene, options, &mut |progress| bar.show(progress))?)
+    Ok(pipeline::reconstruct_on(threads, scene, options, &mut |progress| bar.show(progress))?)
 }
 
 /// One line.

@@ -6,6 +6,7 @@ use crate::shown::{self, Bar};
 use crate::{files, scene};
 use serde::Serialize;
 use vg::io::{self, ply};
+use vg::progress::Threads;
 use vg::refine::{self, Densify, RefineOptions, Refinement, Stop};
 
 /// What `--report` writes.
@@ -30,7 +31,8 @@ pub(crate) fn run(args: &RefineArgs) -> Result {
     if gaussians.is_empty() {
         return Err(Failure::job(format!("{}: no Gaussians to refine", args.asset.display())));
     }
-    let opened = scene::load(index)?;
+    let threads = Threads::new(args.threads)?;
+    let opened = scene::load(index, &threads)?;
     let settings = RefineOptions {
         amount: args.amount,
         hold_out: args.hold_out,
@@ -40,7 +42,7 @@ pub(crate) fn run(args: &RefineArgs) -> Result {
     };
     let bar = Bar::of_reconstruction();
     let mut show = |progress| bar.show(progress);
-    let (refined, done) = refine::model(&gaussians, &opened.scene, &settings, args.threads, &mut show)?;
+    let (refined, done) = refine::model_on(&threads, &gaussians, &opened.scene, &settings, &mut show)?;
     drop(bar);
     match done.stop {
         Stop::Unseen => job::note("no view sees anything of the model: it is as it was"),

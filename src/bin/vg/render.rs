@@ -38,7 +38,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result {
 
     let options = RenderOptions { background: args.background, ..RenderOptions::default() };
     let threads = Threads::new(args.threads)?;
-    let ready = AssetRenderer::new(Arc::new(gaussians), args.backend)?;
+    let ready = threads.run(|| AssetRenderer::new(Arc::new(gaussians), args.backend))?;
     let bar = Bar::of_pictures(cameras.len());
     let seen: Vec<Camera> = cameras.iter().map(|named| named.camera).collect();
     if args.depth {

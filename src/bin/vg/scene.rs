@@ -4,6 +4,7 @@ use crate::args::FrameArgs;
 use crate::job::{self, Result};
 use std::path::{Path, PathBuf};
 use vg::io::{SceneFiles, SceneIndex, SceneOptions};
+use vg::progress::Threads;
 
 /// The scene's options without names of views.
 pub(crate) fn options(frame: &FrameArgs, depth_scale: Option<f64>, load_depth: bool) -> Result<SceneOptions> {
@@ -13,8 +14,13 @@ pub(crate) fn options(frame: &FrameArgs, depth_scale: Option<f64>, load_depth: b
 }
 
 /// Reads the views of these names.
-pub(crate) fn open(path: &Path, views: &[String], options: &SceneOptions) -> Result<SceneFiles> {
-    load(vg::io::list_scene(path, &named(Some(views), options))?)
+pub(crate) fn open(
+    path: &Path,
+    views: &[String],
+    options: &SceneOptions,
+    threads: &Threads,
+) -> Result<SceneFiles> {
+    load(vg::io::list_scene(path, &named(Some(views), options))?, threads)
 }
 
 /// These options with these views.
@@ -39,8 +45,8 @@ pub(crate) fn files_of(index: &SceneIndex) -> Vec<PathBuf> {
 }
 
 /// Reads the pixels of listed views, and says what looks like a mistake.
-pub(crate) fn load(index: SceneIndex) -> Result<SceneFiles> {
-    let files = index.load()?;
+pub(crate) fn load(index: SceneIndex, threads: &Threads) -> Result<SceneFiles> {
+    let files = threads.run(|| index.load())?;
     files.notes.iter().for_each(|note| job::note(note));
     Ok(files)
 }

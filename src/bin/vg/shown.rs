@@ -2,7 +2,6 @@
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::ops::ControlFlow;
-use std::time::Duration;
 use vg::progress::Progress;
 
 /// Steps of the bar of a reconstruction: finer than columns of a terminal.
@@ -32,7 +31,6 @@ impl Bar {
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
-        bar.enable_steady_tick(Duration::from_millis(200));
         Self { bar }
     }
 
@@ -43,6 +41,8 @@ impl Bar {
             None => self.bar.set_message(progress.stage),
         }
         self.bar.set_position((progress.overall * STEPS as f64) as u64);
+        // Time goes on while a stage stands; no thread of its own shows that.
+        self.bar.tick();
         ControlFlow::Continue(())
     }
 

@@ -1,6 +1,7 @@
 //! The graphics processor: found, opened once, and what it reports when something goes wrong.
 
 use crate::error::{Error, Result};
+use crate::threads::without_signals;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// What is missing where no picture can be drawn.
@@ -69,7 +70,7 @@ impl Device {
             memory_hints: wgpu::MemoryHints::Performance,
             trace: wgpu::Trace::Off,
         });
-        let (device, queue) = pollster::block_on(opened).map_err(|e| Error::Missing {
+        let (device, queue) = without_signals(|| pollster::block_on(opened)).map_err(|e| Error::Missing {
             what: WHAT,
             found: format!("{} cannot be opened: {e}", info.name),
             remedy: "see to its driver, or draw on the CPU".into(),

@@ -523,7 +523,9 @@ impl Call {
         }
         let mut error: *mut vg_error = std::ptr::with_exposed_provenance_mut(NOWHERE);
         let out_error = if with_error { &raw mut error } else { null_mut() };
+        let errno = unusual_errno();
         let status = unsafe { (self.invoke)(&words, out_error) };
+        assert_eq!(std::io::Error::last_os_error().raw_os_error(), errno, "{}: errno", self.function);
 
         let has_error = with_error && self.has_error;
         let message = if has_error { unsafe { taken(error, status) } } else { String::new() };
@@ -585,6 +587,13 @@ impl Call {
             }
         }
     }
+}
+
+/// Leaves an errno that no call of the library comes by.
+fn unusual_errno() -> Option<i32> {
+    // A file is no folder.
+    let _ = std::fs::metadata(std::env::current_exe().unwrap_or_default().join("in it"));
+    std::io::Error::last_os_error().raw_os_error()
 }
 
 /// The invariants of Gaussians.
@@ -650,6 +659,8 @@ pub struct Photograph {
 
 /// Handles and pictures that calls are made with.
 pub struct World {
+    /// Of the context.
+    pub threads: u32,
     pub context: usize,
     pub gaussians: usize,
     /// Three of them, of degree 0.
@@ -668,7 +679,12 @@ pub const HEIGHT: u32 = 36;
 
 impl World {
     pub fn new(sample: &Path, scratch: &Path) -> Self {
+        Self::on_threads(2, sample, scratch)
+    }
+
+    pub fn on_threads(threads: u32, sample: &Path, scratch: &Path) -> Self {
         let mut world = Self {
+            threads,
             context: 0,
             gaussians: 0,
             few: 0,
@@ -975,9 +991,11 @@ fn context_options() -> Lent {
     lent
 }
 
-pub fn context_new(_: &World) -> Call {
+pub fn context_new(w: &World) -> Call {
+    let mut options = context_options();
+    options.put("threads", 0, w.threads.into());
     Call::new("vg_context_new", invoke!(vg_context_new 0 1))
-        .argument("options", Value::Struct(context_options()))
+        .argument("options", Value::Struct(options))
         .nullable()
         .argument("out", Value::OutHandle(Made::Context))
 }

@@ -27,6 +27,7 @@ from ._errors import (
     NotBuiltError,
     ReconstructionError,
     Status,
+    ThreadsError,
     VgError,
 )
 from ._evaluate import ViewScore, evaluate
@@ -79,6 +80,7 @@ __all__ = [
     "Scene",
     "Status",
     "SurfaceErrors",
+    "ThreadsError",
     "VgError",
     "VgWarning",
     "ViewErrors",

@@ -27,6 +27,8 @@ class Status(enum.IntEnum):
     INTERNAL = 7
     #: Something is needed that this machine does not have.
     MISSING = 8
+    #: The operating system did not start the threads that were asked for.
+    THREADS = 9
 
 
 class VgError(Exception):
@@ -111,6 +113,10 @@ class MissingError(VgError, RuntimeError):
     """Something is needed that this machine does not have (MISSING)."""
 
 
+class ThreadsError(VgError, RuntimeError):
+    """The system does not start the threads that were asked for (THREADS)."""
+
+
 _CLASSES: dict[int, type[VgError]] = {
     Status.ARGUMENT: ArgumentError,
     Status.FORMAT: FormatError,
@@ -119,6 +125,7 @@ _CLASSES: dict[int, type[VgError]] = {
     Status.NOT_BUILT: NotBuiltError,
     Status.INTERNAL: InternalError,
     Status.MISSING: MissingError,
+    Status.THREADS: ThreadsError,
 }
 
 

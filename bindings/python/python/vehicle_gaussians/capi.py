@@ -522,6 +522,7 @@ PROTOTYPES: Mapping[str, tuple[Any, tuple[Any, ...]]] = {
     "vg_context_new": (_i32, (_pointer(vg_context_options), _out, _out)),
     "vg_context_threads": (_u32, (_handle,)),
     "vg_context_free": (None, (_handle,)),
+    "vg_default_context_free": (None, ()),
     "vg_camera_init": (_i32, (_pointer(vg_camera), _size)),
     "vg_camera_from_colmap_model": (_i32, (_i32, _numbers, _size, _u32, _u32, _numbers, _pointer(vg_camera), _out)),
     "vg_camera_from_opencv": (

@@ -17,6 +17,7 @@ use std::ffi::OsString;
 use std::path::Path;
 use vg::io::FitQuality;
 use vg::onnx::ModelOptions;
+use vg::progress::Threads;
 use vg::scene::Cloud;
 
 /// What became of one system.
@@ -115,15 +116,16 @@ pub(crate) fn hold(
 ) -> Result<Contest> {
     let judge = Judge::open(judge, models)?;
     let scenes = vehicles::found(&vehicles.scenes)?;
+    let threads = Threads::new(most_threads(systems))?;
     let mut runs: Vec<Runs> = systems.iter().map(|_| Runs::default()).collect();
     let (mut errors, mut aligned) = (Vec::new(), Vec::new());
     for scene in &scenes {
-        let measured = Vehicle::open(scene, vehicles).and_then(|vehicle| {
+        let measured = Vehicle::open(scene, vehicles, &threads).and_then(|vehicle| {
             aligned.extend(vehicle.fit.map(|FitQuality { residual_m, confidence }| {
                 let scene = vehicle.name.clone();
                 Aligned { scene, residual_m, confidence }
             }));
-            one(&vehicle, &judge, systems, repeat, &mut runs)
+            one(&vehicle, &judge, systems, repeat, &threads, &mut runs)
         });
         match measured {
             Ok(()) => job::warn(),
@@ -140,30 +142,63 @@ pub(crate) fn hold(
     Ok(Contest { rows, errors, aligned, lpips_net: judge.lpips_net().map(Into::into) })
 }
 
-/// All systems in a vehicle's splits.
-fn one(vehicle: &Vehicle, judge: &Judge, systems: &[System], repeat: u32, runs: &mut [Runs]) -> Result<()> {
+/// The most threads that one of the systems works on; 0, which is all cores, where one does.
+fn most_threads(systems: &[System]) -> usize {
+    let of = |system: &System| match &system.maker {
+        Maker::Method(method) => method.settings.threads,
+        Maker::Import(_) | Maker::Missing(_) => 0,
+    };
+    let all: Vec<usize> = systems.iter().map(of).collect();
+    if all.contains(&0) { 0 } else { all.into_iter().max().unwrap_or(0) }
+}
+
+/// Runs `work` on as many threads as a method asks for: `threads` where they are as many.
+fn on_threads_of<T>(
+    method: &Method,
+    threads: &Threads,
+    work: impl FnOnce(&Threads) -> Result<T>,
+) -> Result<T> {
+    match method.settings.threads {
+        // Where one asks for all cores, these are all.
+        count if count == 0 || count == threads.count() => work(threads),
+        count => work(&Threads::new(count)?),
+    }
+}
+
+/// All systems in a vehicle's splits. A method works on as many threads as it asks for, all else on `threads`.
+fn one(
+    vehicle: &Vehicle,
+    judge: &Judge,
+    systems: &[System],
+    repeat: u32,
+    threads: &Threads,
+    runs: &mut [Runs],
+) -> Result<()> {
     let judge: OfVehicle = judge.of(&vehicle.scene)?;
     // A cause that several systems meet is told once.
     let mut said = HashSet::new();
     for (key, split) in &vehicle.splits {
         // What is wrong with the photographs is not the systems' fault.
         let views = split.input.iter().chain(&split.test).cloned().collect::<Vec<_>>();
-        scene::open(&vehicle.scene, &views, &vehicle.options(None))?;
+        scene::open(&vehicle.scene, &views, &vehicle.options(None), threads)?;
         let mut timed = Vec::new();
         for (system, runs) in systems.iter().zip(runs.iter_mut()) {
             let Some(split) = system.takes.split(vehicle, split)? else { continue };
             let measured = match &system.maker {
                 Maker::Missing(_) => continue,
                 Maker::Import(import) => import
-                    .model(vehicle, key, &split, judge.scan.as_ref())
+                    .model(vehicle, key, &split, judge.scan.as_ref(), threads)
                     .and_then(|made| {
                         let options = vehicle.options(None);
-                        measure::model(&Shown::plain(&vehicle.scene, &options), &split, &made, 0, &judge)
+                        let from = Shown::plain(&vehicle.scene, &options);
+                        measure::model(&from, &split, &made, &judge, threads)
                     })
                     .map(|m| Measured { reconstruct_ms: import.seconds.map(|s| 1e3 * s), ..m }),
-                Maker::Method(method) => {
-                    shown(vehicle, method, |shown| measure::split(shown, &split, &method.settings, &judge))
-                }
+                Maker::Method(method) => on_threads_of(method, threads, |own| {
+                    shown(vehicle, method, |shown| {
+                        measure::split(shown, &split, &method.settings, &judge, own)
+                    })
+                }),
             };
             match measured {
                 Ok(measured) => {
@@ -192,7 +227,9 @@ fn one(vehicle: &Vehicle, judge: &Judge, systems: &[System], repeat: u32, runs: 
         }
         for _ in 1..repeat {
             for (method, split, runs) in &mut timed {
-                let ms = shown(vehicle, method, |shown| measure::time(shown, split, &method.settings))?;
+                let ms = on_threads_of(method, threads, |own| {
+                    shown(vehicle, method, |shown| measure::time(shown, split, &method.settings, own))
+                })?;
                 runs.each.last_mut().expect("the first round made it").seconds.push(ms / 1e3);
             }
         }

@@ -7,6 +7,7 @@ use crate::scene;
 use std::path::{Path, PathBuf};
 use vg::imports::{self, Up};
 use vg::io::ply;
+use vg::progress::Threads;
 use vg::scene::Cloud;
 use vg::{Gaussians, View};
 
@@ -76,20 +77,22 @@ impl Import {
         key: &str,
         split: &Split,
         scan: Option<&Cloud>,
+        threads: &Threads,
     ) -> Result<Gaussians> {
         let path = PathBuf::from(self.pattern.replace("{scene}", &vehicle.name).replace("{split}", key));
         if self.kind == Kind::Vehicle {
             return read(&path);
         }
-        let views = scene::open(&vehicle.scene, &split.input, &vehicle.options(None))?.scene.views;
+        let views = scene::open(&vehicle.scene, &split.input, &vehicle.options(None), threads)?.scene.views;
         if self.kind == Kind::DepthAnything3 {
-            return of_views(&path, &views, vehicle);
+            return threads.run(|| of_views(&path, &views, vehicle));
         }
         let scan = scan.ok_or_else(|| {
             Failure::job("has no frame of its own and is fitted to a scan: needs --scan P.ply")
         })?;
         let up = if self.kind == Kind::Trellis { Up::MinusY } else { Up::Z };
-        let placed = imports::place_object(&read(&path)?, up, scan, &views)?;
+        let object = read(&path)?;
+        let placed = threads.run(|| imports::place_object(&object, up, scan, &views))?;
         Ok(placed.gaussians)
     }
 }

@@ -83,11 +83,17 @@ impl<'a> Shown<'a> {
 }
 
 /// Reconstructs and measures once.
-pub(crate) fn split(from: &Shown, split: &Split, method: &Options, judge: &OfVehicle) -> Result<Measured> {
-    let shown = inputs(from, split, method)?;
-    let made = reconstruct::reconstruct(&shown, method)?;
+pub(crate) fn split(
+    from: &Shown,
+    split: &Split,
+    method: &Options,
+    judge: &OfVehicle,
+    threads: &Threads,
+) -> Result<Measured> {
+    let shown = inputs(from, split, method, threads)?;
+    let made = reconstruct::reconstruct(&shown, method, threads)?;
     drop(shown);
-    let mut measured = model(from, split, &made.gaussians, method.threads, judge)?;
+    let mut measured = model(from, split, &made.gaussians, judge, threads)?;
     measured.prior = made.report.prior.to_owned();
     measured.reconstruct_ms = Some(made.report.total_ms);
     measured.verdict = Some(made.report.verdict);
@@ -102,27 +108,26 @@ pub(crate) fn model(
     from: &Shown,
     split: &Split,
     made: &Gaussians,
-    threads: usize,
     by: &OfVehicle,
+    threads: &Threads,
 ) -> Result<Measured> {
     // Depth is for the measure only; a method has done its work without, unless it was to see it.
     let with_depth = SceneOptions { load_depth: true, ..from.options.clone() };
-    let judged = scene::open(from.scene, &split.test, &with_depth)?;
+    let judged = scene::open(from.scene, &split.test, &with_depth, threads)?;
     let (drawn_tests, mut measured) = judge(made, &judged.scene.views, threads)?;
     if let Some(lpips) = by.lpips {
         for ((view, drawn), truth) in measured.views.iter_mut().zip(&drawn_tests).zip(&judged.scene.views) {
-            view.lpips = lpips.of(drawn, truth)?;
+            view.lpips = threads.run(|| lpips.of(drawn, truth))?;
         }
         measured.lpips = mean_of(measured.views.iter().filter_map(|view| view.lpips));
     }
     drop((drawn_tests, judged));
     if let Some(scan) = &by.scan {
-        measured.surface = Some(Threads::new(threads)?.run(|| SurfaceErrors::of(made, scan.points()))?);
+        measured.surface = Some(threads.run(|| SurfaceErrors::of(made, scan.points()))?);
     }
-    let judged = scene::open(from.scene, &split.input, &with_depth)?;
+    let judged = scene::open(from.scene, &split.input, &with_depth, threads)?;
     let drawn = drawn(made, &judged.scene.views, threads)?.0;
-    let errors: Vec<_> = drawn.iter().zip(&judged.scene.views).map(|(d, v)| ViewErrors::of(d, v)).collect();
-    let mean = ViewErrors::mean(&errors);
+    let mean = ViewErrors::mean(&errors_of(&drawn, &judged.scene.views, threads));
     measured.input_psnr_db = mean.map(|mean| mean.psnr_db);
     measured.input_ssim = mean.and_then(|mean| mean.ssim);
     measured.input_depth_mae_m = mean.and_then(|mean| mean.depth_mae_m);
@@ -131,16 +136,17 @@ pub(crate) fn model(
 }
 
 /// Milliseconds of one more reconstruction of the same.
-pub(crate) fn time(from: &Shown, split: &Split, method: &Options) -> Result<f64> {
-    Ok(reconstruct::reconstruct(&inputs(from, split, method)?, method)?.report.total_ms)
+pub(crate) fn time(from: &Shown, split: &Split, method: &Options, threads: &Threads) -> Result<f64> {
+    let shown = inputs(from, split, method, threads)?;
+    Ok(reconstruct::reconstruct(&shown, method, threads)?.report.total_ms)
 }
 
 /// The views the method sees, with depth only where it is to use it.
-fn inputs(from: &Shown, split: &Split, method: &Options) -> Result<vg::Scene> {
+fn inputs(from: &Shown, split: &Split, method: &Options, threads: &Threads) -> Result<vg::Scene> {
     let load_depth =
         matches!(method.prior, PriorChoice::Auto | PriorChoice::Given) && method.baseline.is_none();
     let options = SceneOptions { load_depth, ..from.options.clone() };
-    let mut shown = scene::open(from.scene, &split.input, &options)?.scene;
+    let mut shown = scene::open(from.scene, &split.input, &options, threads)?.scene;
     shown.cloud = match (from.cloud, from.cloud_points) {
         (Some(cloud), Some(count)) => Some(Cloud::new(sweep(cloud.points(), &shown.views, count))?),
         (cloud, _) => cloud.cloned(),
@@ -152,9 +158,13 @@ fn inputs(from: &Shown, split: &Split, method: &Options) -> Result<vg::Scene> {
 }
 
 /// The model drawn into these views, and how far that is from their photographs.
-pub(crate) fn judge(made: &Gaussians, views: &[View], threads: usize) -> Result<(Vec<Rendered>, Measured)> {
+pub(crate) fn judge(
+    made: &Gaussians,
+    views: &[View],
+    threads: &Threads,
+) -> Result<(Vec<Rendered>, Measured)> {
     let (drawn, render_ms) = drawn(made, views, threads)?;
-    let each: Vec<ViewErrors> = drawn.iter().zip(views).map(|(d, v)| ViewErrors::of(d, v)).collect();
+    let each = errors_of(&drawn, views, threads);
     let none = || Error::argument("test", "no view", "at least one");
     let measured = Measured {
         prior: String::new(),
@@ -178,9 +188,12 @@ pub(crate) fn judge(made: &Gaussians, views: &[View], threads: usize) -> Result<
     Ok((drawn, measured))
 }
 
+fn errors_of(drawn: &[Rendered], views: &[View], threads: &Threads) -> Vec<ViewErrors> {
+    threads.run(|| drawn.iter().zip(views).map(|(d, v)| ViewErrors::of(d, v)).collect())
+}
+
 /// The model as these views' cameras see it, on white, and the median time of one picture, milliseconds.
-fn drawn(gaussians: &Gaussians, views: &[View], threads: usize) -> Result<(Vec<Rendered>, f64)> {
-    let threads = Threads::new(threads)?;
+fn drawn(gaussians: &Gaussians, views: &[View], threads: &Threads) -> Result<(Vec<Rendered>, f64)> {
     let (renderer, options) = (CpuRenderer::new(), RenderOptions::default());
     // The first picture also pays for memory that later ones reuse.
     if let Some(first) = views.first() {

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use vg::align::Heading;
 use vg::geometry::Similarity;
 use vg::io::{FitQuality, SceneFormat, SceneOptions};
+use vg::progress::Threads;
 
 /// What a scene's folder has one of.
 const OF_A_SCENE: [&str; 8] = [
@@ -37,7 +38,7 @@ pub(crate) struct Vehicle {
 
 impl Vehicle {
     /// Reads what a measurement needs to know before any picture.
-    pub(crate) fn open(scene: &Path, args: &VehiclesArgs) -> Result<Self> {
+    pub(crate) fn open(scene: &Path, args: &VehiclesArgs, threads: &Threads) -> Result<Self> {
         let splits = split::read(&split::find(&args.split, scene), args.only.as_deref())?;
         let mut vehicle = Self {
             name: scenes::name(scene),
@@ -51,7 +52,7 @@ impl Vehicle {
             vehicle.vehicle_from_world = Some(vg::io::read_vehicle_from_world(&split::find(path, scene))?);
         } else if let Some(named) = &args.align {
             let named = named.as_ref().map(|path| split::find(path, scene));
-            let found = align::to_scan_of(scene, named.as_deref(), Heading::Auto)?;
+            let found = align::to_scan_of(scene, named.as_deref(), Heading::Auto, threads)?;
             vehicle.vehicle_from_world = Some(found.vehicle_from_world);
             vehicle.fit = Some(FitQuality { residual_m: found.residual_m, confidence: found.confidence });
             vehicle.format = vg::io::colmap_format(scene);

@@ -60,6 +60,7 @@ pub(super) fn views(
         let start = Instant::now();
         let drawn = threads.run(|| renderer.render(gaussians, &view.camera, &options))?;
         let render_ms = start.elapsed().as_secs_f64() * 1e3;
+        let errors = threads.run(|| ViewErrors::of(&drawn, view));
         let shown = match is_shown(i, views.len(), role.most()) {
             true => {
                 let (size, photograph) = ((drawn.width, drawn.height), on_white(view));
@@ -74,12 +75,7 @@ pub(super) fn views(
             }
             false => None,
         };
-        all.push(Compared {
-            name: view.name.clone(),
-            errors: ViewErrors::of(&drawn, view),
-            render_ms,
-            shown,
-        });
+        all.push(Compared { name: view.name.clone(), errors, render_ms, shown });
         bar.advance();
     }
     Ok(all)

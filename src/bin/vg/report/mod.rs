@@ -41,19 +41,19 @@ pub(crate) fn run(args: &ReportArgs) -> Result {
     files::refuse_clashes(std::slice::from_ref(&args.output), &read)?;
     files::prepare(&args.output)?;
 
-    let mut opened = scene::load(inputs)?.scene;
+    let threads = Threads::new(method.threads)?;
+    let mut opened = scene::load(inputs, &threads)?.scene;
     opened.cloud = cloud_file.as_deref().map(cloud::read).transpose()?;
-    let made = reconstruct::reconstruct(&opened, &method.options()?)?;
+    let made = reconstruct::reconstruct(&opened, &method.options()?, &threads)?;
     reconstruct::note_warnings(&made.report);
     reconstruct::accept(&made.report, &args.strict)?;
 
-    let threads = Threads::new(method.threads)?;
     let inputs = compare::views(&made.gaussians, &opened.views, Role::Input, &threads)?;
     let counts = facts::counts(&opened.views, &made.report);
     drop(opened);
     let tests = match tests {
         Some(tests) => {
-            compare::views(&made.gaussians, &scene::load(tests)?.scene.views, Role::Test, &threads)?
+            compare::views(&made.gaussians, &scene::load(tests, &threads)?.scene.views, Role::Test, &threads)?
         }
         None => Vec::new(),
     };

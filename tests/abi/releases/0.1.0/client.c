@@ -862,6 +862,7 @@ int main(int argc, char **argv) {
     vg_report_free(NULL);
     vg_context_free(context);
     vg_context_free(NULL);
+    vg_default_context_free();
     vg_error_free(NULL);
     return 0;
 }
