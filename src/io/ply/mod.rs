@@ -1,9 +1,13 @@
 //! PLY: Gaussians in the 3DGS layout, and coloured point clouds.
 
+mod content;
+mod foreign;
 mod gaussians;
 mod header;
 mod points;
 mod rows;
+mod variant;
 
+pub use content::{Content, OtherGaussians, read_content};
 pub use gaussians::{PlyNotes, read, read_from, write, write_to};
-pub use points::{ColoredPoints, read_points, read_points_from, write_points};
+pub use points::{ColoredPoints, read_points, read_points_from, write_points, write_points_to};
