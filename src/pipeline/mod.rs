@@ -2,6 +2,7 @@
 
 mod baseline;
 pub mod budget;
+pub mod cap;
 mod check;
 mod cost;
 pub mod machine;
@@ -13,6 +14,7 @@ pub mod run;
 mod spread;
 
 pub use budget::{BudgetPlan, Chosen};
+pub use cap::{DEFAULT_MAX_GAUSSIANS, GAUSSIANS};
 pub use machine::Machine;
 pub use options::{Calibrate, Keep, Options, PriorChoice};
 pub use report::{InputError, LeftOut, Report, Stage};

@@ -28,7 +28,7 @@ type Points<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>);
 #[pyfunction]
 #[pyo3(signature = (
     images, masks, cameras, depths, *, prior, prior_model, head_model, calibrate, symmetry, relight, photo, cloud,
-    vehicle_size, sh_degree, keep, check, points, budget, resolution, max_views, refine_iterations,
+    vehicle_size, sh_degree, keep, check, points, budget, resolution, max_views, max_gaussians, refine_iterations,
     refine_seconds, refine_hold_out, refine_backend, threads, names, progress
 ))]
 pub(crate) fn reconstruct<'py>(
@@ -53,6 +53,7 @@ pub(crate) fn reconstruct<'py>(
     budget: Option<f64>,
     resolution: f64,
     max_views: Option<usize>,
+    max_gaussians: Option<usize>,
     refine_iterations: Option<u32>,
     refine_seconds: Option<f64>,
     refine_hold_out: bool,
@@ -76,6 +77,7 @@ pub(crate) fn reconstruct<'py>(
         budget_s: budget,
         resolution,
         max_views,
+        max_gaussians,
         threads,
         points,
         refine: refinement(py, refine_iterations, refine_seconds, refine_hold_out, refine_backend)?,

@@ -1257,6 +1257,7 @@ fn options(context: usize) -> Lent {
         refine_hold_out: choice(&[0, 1]),
         refine_backend: choice_without(&[0, 1], 2),
         refine_flags: reserved(),
+        max_gaussians: [0, 100_000, 1 << 60, u64::MAX].map(|n| (n, Fine)).to_vec(),
     });
     let mut lent = Lent::zeroed::<vg_options>("vg_options", fields);
     lent.put("context", 0, context as u64);

@@ -229,6 +229,7 @@ class vg_options(ct.Structure):
         ("refine_hold_out", ct.c_int32),
         ("refine_backend", ct.c_int32),
         ("refine_flags", ct.c_uint32),
+        ("max_gaussians", ct.c_size_t),
     )
 
 
@@ -1152,6 +1153,7 @@ def reconstruct(
     budget: float | None = None,
     resolution: float = 1.0,
     max_views: int | None = None,
+    max_gaussians: int | None = 12_000_000,
     refine_iterations: int | None = None,
     refine_seconds: float | None = None,
     refine_hold_out: bool = False,
@@ -1207,6 +1209,10 @@ def reconstruct(
         if max_views < 1:
             raise VgError(Status.ARGUMENT, f"max_views: {max_views}; allowed: at least 1")
         options.max_views = max_views
+    # Of C, 0 is any number.
+    if max_gaussians is not None and max_gaussians < 1:
+        raise VgError(Status.ARGUMENT, f"max_gaussians: {max_gaussians}; allowed: at least 1")
+    options.max_gaussians = max_gaussians or 0
     if refine_iterations is not None:
         # Of C, 0 is none.
         if not 1 <= refine_iterations < 1 << 32:
