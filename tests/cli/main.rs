@@ -6,11 +6,14 @@ mod errors;
 mod eval;
 mod hostile;
 mod info;
+#[cfg(unix)]
+mod interrupt;
 mod pareto;
 mod reconstruct;
 mod refine;
 mod render;
 mod report;
+mod results;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
