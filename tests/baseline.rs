@@ -52,7 +52,7 @@ fn input_views_are_learned_from_a_random_start() {
     assert_eq!((densified.resets, densified.full), (5, false));
     assert_eq!((report.prior, report.head, report.sh_degree), ("none", "3dgs", 3));
     assert_eq!((report.symmetry.mode, report.symmetry.cloned), (SymmetryMode::Never, 0));
-    assert!(report.vehicle_box.is_some() && report.calibration.is_none());
+    assert!(report.working_box.is_some() && report.calibration.is_none());
     let checked = report.input_error.unwrap();
     assert!((checked.psnr_db - done.psnr_db[1]).abs() < 0.1, "{checked:?}");
 }
@@ -101,7 +101,7 @@ fn a_cloud_is_what_it_starts_from() {
         let on_unit = (glam::Vec3::from_array(*m).as_dvec3() / HALF).length();
         assert!((on_unit - 1.0).abs() < 1e-5, "{m:?}");
     }
-    assert!(made.report.vehicle_box.is_none());
+    assert!(made.report.working_box.is_none());
     assert!(made.report.left_out.iter().any(|l| l.what == "points" && l.count == 1));
     let learned = run(&scene, &options(steps(200))).report.refinement.unwrap().psnr_db;
     assert!(learned[1] > learned[0] + 3.0, "{learned:?}");

@@ -164,7 +164,7 @@ fn shift(x: f64, y: f64, z: f64) -> vg::geometry::Pose {
 #[test]
 fn a_scene_that_agrees_with_itself_is_good_with_depth_and_without_and_with_one_view() {
     let scene = right_side(160, 120);
-    let one = Scene { views: scene.views[1..2].to_vec(), cloud: None };
+    let one = Scene { views: scene.views[1..2].to_vec(), ..Scene::default() };
     for (scene, options) in [
         (scene.clone(), Options::default()),
         (without_depth(scene.clone()), Options::default()),
@@ -363,6 +363,25 @@ fn the_report_is_json_with_the_promised_keys() {
 }
 
 // What the plan leaves out, each on a scene where it fires.
+
+#[test]
+fn the_masks_tell_before_the_work_how_large_a_model_can_become() {
+    let scene = right_side(96, 72);
+    let with = |max_gaussians| run(&scene, &Options { max_gaussians, ..Options::default() });
+    let whole = with(None);
+    assert_eq!(whole.gaussians, run(&scene, &Options::default()).gaussians);
+    for share in [4, 20] {
+        let cap = whole.gaussians.len() / share;
+        let made = with(Some(cap));
+        assert!((1..=cap).contains(&made.gaussians.len()), "{} of {cap}", made.gaussians.len());
+        assert!(left_out(&made, &format!("max_gaussians, {cap}: the views are resampled to 0.")) > 0);
+        assert!(left_out(&made, "averaged into fewer") > 0);
+        // The same again: what was asked for is what the settings say.
+        assert_eq!(made.report.settings.resolution, 1.0);
+    }
+    let error = error(&scene, &Options { max_gaussians: Some(1), ..Options::default() });
+    assert!(error.contains("options.max_gaussians: 1, where"), "{error}");
+}
 
 #[test]
 fn a_view_with_an_empty_mask_is_left_out() {

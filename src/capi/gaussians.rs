@@ -155,9 +155,10 @@ pub unsafe extern "C" fn vg_gaussians_sh(gaussians: *const vg_gaussians) -> *con
     unsafe { borrowed(gaussians, Gaussians::sh) }
 }
 
-/// Reads Gaussians from a PLY file in the layout of 3D Gaussian Splatting.
+/// Reads Gaussians from a PLY file in the layout of 3D Gaussian Splatting. Other formats (SPZ, SOG, .splat, packed PLY,
+/// glTF) and other kinds of Gaussians are errors that name them and the way out.
 ///
-/// - path: not NULL.
+/// - path: not NULL. A file or a pipe; a pipe that nothing writes to is an error after ten seconds.
 /// - out: receives the Gaussians; the caller frees them. NULL on failure.
 /// - out_error: NULL, or receives the error.
 #[unsafe(no_mangle)]
@@ -175,9 +176,9 @@ pub unsafe extern "C" fn vg_gaussians_load_ply(
 }
 
 /// Writes Gaussians as a PLY file in the layout of 3D Gaussian Splatting. A file that is there is replaced once the
-/// new one is complete; on failure it is as it was.
+/// new one is complete and on the disk, and keeps its permissions; on failure it is as it was.
 ///
-/// - gaussians, path: not NULL.
+/// - gaussians, path: not NULL. A name that ends like that of another format, car.spz, is refused.
 /// - out_error: NULL, or receives the error.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn vg_gaussians_save_ply(

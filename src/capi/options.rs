@@ -7,7 +7,7 @@ use super::read::{self, Versioned};
 use super::render::{backend, vg_backend};
 use super::status::{c_string, one_line, vg_status};
 use crate::error::{Error, Result};
-use crate::pipeline::{Calibrate, Keep, Options, PriorChoice};
+use crate::pipeline::{Calibrate, DEFAULT_MAX_GAUSSIANS, Keep, Options, PriorChoice};
 use crate::refine::{Amount, RefineOptions};
 use crate::relight::Relight;
 use crate::scene::cloud::MAX_CLOUD_POINTS;
@@ -195,6 +195,11 @@ pub struct vg_options {
     /// NULL, or where the part of the whole call that is done is written before each call of `progress`: 0 to 1, in
     /// expected time; it never falls, and is 1 in the last call.
     pub progress_overall: *mut f64,
+    /// Most Gaussians that the vehicle pixels of the used views and their mirror images may be able to become; 0: any
+    /// number. Where they could become more, the views are resampled to fewer pixels, decided from the masks before the
+    /// work, and the log and the report say so. A model usually has a half to a tenth of that. Default 12000000, whose PLY
+    /// file would have 2 GB.
+    pub max_gaussians: usize,
 }
 
 unsafe impl Versioned for vg_options {
@@ -237,6 +242,7 @@ unsafe impl Versioned for vg_options {
             has_vehicle_place: 0,
             vehicle_flags: 0,
             progress_overall: std::ptr::null_mut(),
+            max_gaussians: DEFAULT_MAX_GAUSSIANS,
         }
     }
 }
@@ -285,6 +291,7 @@ impl vg_options {
             budget_s: (self.budget_s != 0.0).then_some(self.budget_s),
             resolution: self.resolution,
             max_views: (self.max_views != 0).then_some(self.max_views),
+            max_gaussians: (self.max_gaussians != 0).then_some(self.max_gaussians),
             baseline: None,
             ignore_offset: false,
             points: read::flag("options.points", self.points)?,

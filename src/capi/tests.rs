@@ -65,7 +65,8 @@ fn layout_of_rust() -> String {
             struct_size context prior symmetry sh_degree keep check points vehicle_size progress progress_user log
             log_user calibrate relight photo flags budget_s cloud cloud_count resolution
             max_views prior_model head_model refine_seconds refine_iterations refine_hold_out
-            refine_backend refine_flags vehicle_center vehicle_yaw has_vehicle_place vehicle_flags
+            refine_backend refine_flags vehicle_center vehicle_yaw has_vehicle_place vehicle_flags progress_overall
+            max_gaussians
         }
         vg_picture_errors { struct_size psnr_db ssim lpips }
         vg_refine_options {

@@ -19,10 +19,12 @@ pub mod ply;
 mod realcar;
 pub mod scene;
 mod select;
+mod stream;
 pub mod transforms;
 pub mod vehicle_frame;
+mod writes;
 
-pub use files::write_atomically;
+pub use files::{check_folder, folds_case, resolved, write_atomically};
 pub use masked::{MaskedViews, colmap_format, read_masked};
 pub use realcar::find_scan;
 pub use scene::{
@@ -30,6 +32,7 @@ pub use scene::{
     open_scene_watched,
 };
 pub use vehicle_frame::{
-    FitQuality, read_known_centers, read_matrix, read_vehicle_from_world, vehicle_from_known_centers,
-    write_alignment, write_vehicle_from_world,
+    FitQuality, alignment_text, read_known_centers, read_matrix, read_vehicle_from_world,
+    vehicle_from_known_centers, write_alignment, write_vehicle_from_world,
 };
+pub use writes::{Writes, writes};

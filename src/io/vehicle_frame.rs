@@ -92,6 +92,12 @@ pub fn write_alignment(
     vehicle_from_world: &Similarity,
     quality: Option<FitQuality>,
 ) -> Result<()> {
+    let text = alignment_text(vehicle_from_world, quality)?;
+    write_atomically(path, |out| out.write_all(text.as_bytes()))
+}
+
+/// The text of that file.
+pub fn alignment_text(vehicle_from_world: &Similarity, quality: Option<FitQuality>) -> Result<String> {
     let m = vehicle_from_world.to_row_major();
     if !m.iter().all(|v| v.is_finite()) {
         return Err(Error::argument("vehicle_from_world", "a NaN or infinite entry", "finite numbers"));
@@ -102,14 +108,13 @@ pub fn write_alignment(
         let value = value.filter(|v| v.is_finite());
         value.map_or_else(|| "null".to_owned(), |v| format!("{v:?}"))
     };
-    let text = format!(
+    Ok(format!(
         "{{\n  \"vehicle_from_world\": [\n{}\n  ],\n  \"scale\": {:?},\n  \"residual_m\": {},\n  \"confidence\": {}\n}}\n",
         rows.join(",\n"),
         vehicle_from_world.scale,
         number(quality.map(|q| q.residual_m)),
         number(quality.map(|q| q.confidence)),
-    );
-    write_atomically(path, |out| out.write_all(text.as_bytes()))
+    ))
 }
 
 /// Reads camera centres in the vehicle's frame, metres: `{"000.png": [x, y, z], ...}`.

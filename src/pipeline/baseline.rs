@@ -29,7 +29,7 @@ pub(super) fn reconstruct(
     clock.lap("plan");
 
     context.report("undistort", 0.0)?;
-    let views = undistorted(scene, &used, options, &mut left_out, context)?;
+    let views = undistorted(scene, &used, options.resolution, &mut left_out, context)?;
     clock.lap("undistort");
 
     context.report("start", 0.0)?;

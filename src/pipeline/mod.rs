@@ -2,6 +2,7 @@
 
 mod baseline;
 pub mod budget;
+pub mod cap;
 mod check;
 mod cost;
 pub mod machine;
@@ -16,6 +17,7 @@ mod spread;
 pub mod verdict;
 
 pub use budget::{BudgetPlan, Chosen};
+pub use cap::{DEFAULT_MAX_GAUSSIANS, GAUSSIANS};
 pub use machine::Machine;
 pub use options::{Calibrate, Keep, Options, PriorChoice};
 pub use report::{CheckedView, InputError, LeftOut, Report, Stage};

@@ -1,5 +1,6 @@
 //! What a caller may choose; `Options::default()` is what everything is measured with.
 
+use super::cap::DEFAULT_MAX_GAUSSIANS;
 use crate::error::{Error, Result};
 use crate::onnx::{self, Model};
 use crate::refine::RefineOptions;
@@ -103,6 +104,11 @@ pub struct Options {
     pub resolution: f64,
     /// Most views to use; those are kept that spread best around the vehicle.
     pub max_views: Option<usize>,
+    /// Most Gaussians that the vehicle pixels of the used views and their mirror images may be able to become; `None` means
+    /// any number. Where they could become more, the views are resampled to fewer pixels and the report says so: decided
+    /// from the masks before the work. A model usually has a half to a tenth of that. A refinement that densifies adds to
+    /// it, and a baseline does not look at it.
+    pub max_gaussians: Option<usize>,
     /// Worker threads; 0 means one per core.
     pub threads: usize,
     /// Whether to return the metric coloured point cloud as well.
@@ -134,6 +140,7 @@ impl Default for Options {
             budget_s: None,
             resolution: 1.0,
             max_views: None,
+            max_gaussians: Some(DEFAULT_MAX_GAUSSIANS),
             threads: 0,
             points: false,
             refine: None,
@@ -183,6 +190,9 @@ impl Options {
         }
         if self.max_views == Some(0) {
             return Err(Error::argument("options.max_views", "0", "at least 1"));
+        }
+        if self.max_gaussians == Some(0) {
+            return Err(Error::argument("options.max_gaussians", "0", "at least 1"));
         }
         if let Some(refine) = &self.refine {
             refine.validate()?;

@@ -8,7 +8,7 @@ use super::report::{Clock, InputError, LeftOut, Report, peak_rss_bytes};
 use super::size::VehicleSize;
 use super::spread::spread;
 use super::verdict::{self, Examined, Judged};
-use super::{baseline, cost, measured, plan};
+use super::{baseline, cap, cost, measured, plan};
 use crate::calibrate::{self, Calibrated, Moved};
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
@@ -94,7 +94,7 @@ pub fn reconstruct_on<'a>(
     clock.lap("plan");
 
     context.report("undistort", 0.0)?;
-    let given = undistorted(scene, &used, options, &mut left_out, &context)?;
+    let given = cap::fitted(scene, &used, options, &mut left_out, &context)?;
     let known_box = options.vehicle_box(scene);
     // A box that stands beside y = 0 brings its own plane of symmetry along.
     let beside = known_box.and_then(|known| known.place).filter(|place| !place.is_on_the_plane());
@@ -272,23 +272,23 @@ pub(super) fn chosen_views(
 pub(super) fn undistorted(
     scene: &Scene,
     used: &[usize],
-    options: &Options,
+    resolution: f64,
     left_out: &mut Vec<LeftOut>,
     context: &Context,
 ) -> Result<Vec<View>> {
-    let one = |&i: &usize| undistort::undistorted(&resize::resized(&scene.views[i], options.resolution)?);
+    let one = |&i: &usize| undistort::undistorted(&resize::resized(&scene.views[i], resolution)?);
     let mut views: Vec<View> = context.parallel(|| used.par_iter().map(one).collect::<Result<_>>())?;
-    if options.resolution < 1.0 {
+    if resolution < 1.0 {
         let pixels = |camera: &Camera| camera.width as usize * camera.height as usize;
         let all: usize = used.iter().map(|&i| pixels(&scene.views[i].camera)).sum();
         let left: usize = views.iter().map(|v| pixels(&v.camera)).sum();
-        let why = format!("averaged into fewer: the working resolution is {}", options.resolution);
+        let why = format!("averaged into fewer: the working resolution is {resolution}");
         plan::note(left_out, "pixels", &why, all.saturating_sub(left));
         views.retain(|v| v.mask.as_ref().is_none_or(|m| m.vehicle_pixels() > 0));
         let why = "at the working resolution no pixel shows the vehicle";
         plan::note(left_out, "views", why, used.len() - views.len());
         if views.is_empty() {
-            let found = options.resolution.to_string();
+            let found = resolution.to_string();
             let allowed = "a share at which some pixel shows the vehicle";
             return Err(Error::argument("options.resolution", found, allowed));
         }

@@ -738,9 +738,21 @@ fn files_that_are_not_there_or_not_what_they_should_be_are_told_by_path() {
     table.row(load, "a folder", path(text(&folder)), io(folder.to_str().unwrap()));
     table.row(load, "half a header", path(text(&junk)), format("junk.ply"));
     table.row(load, "an empty file", path(text(&empty)), format("empty"));
+    for (name, bytes, says) in [
+        ("car.spz", &b"\x1f\x8b\x08\0"[..], "SPZ"),
+        ("car.glb", b"glTF\x02", "GLB"),
+        ("car.splat", &[0; 64], "splat-transform"),
+    ] {
+        let other = folder.join(name);
+        std::fs::write(&other, bytes).unwrap();
+        table.row(load, name, path(text(&other)), format(says));
+    }
 
     let save = calls::gaussians_save_ply;
     table.row(save, "no such folder", path(missing.clone()), io("/nowhere/"));
+    let spz = folder.join("new.spz");
+    table.row(save, "another format's name", path(text(&spz)), Fails(vg_status::Argument, "path: ".into()));
+    assert!(!spz.exists());
     table.row(save, "a folder", path(text(&folder)), format("is a folder"));
     table.row(save, "over an old file", path(text(&empty)), Fine);
     table.row(save, "no Gaussians", |call| call.arguments[0].value = Value::Handle(nothing()), Fine);
@@ -1476,6 +1488,7 @@ fn options_of_an_older_program_have_the_defaults_of_what_came_later() {
         assert_eq!(settings["relight"], "auto");
         assert_eq!((settings["photo"].as_bool(), settings["budget_s"].is_null()), (Some(true), true));
         assert_eq!((settings["resolution"].as_f64(), settings["max_views"].is_null()), (Some(1.0), true));
+        assert_eq!(settings["max_gaussians"], 12_000_000);
     }
 }
 
@@ -1489,6 +1502,7 @@ fn options_reach_the_library() {
         call.lent("options").put("budget_s", 0, 1e6f64.to_bits());
         call.lent("options").put("resolution", 0, 0.5f64.to_bits());
         call.lent("options").put("max_views", 0, 1);
+        call.lent("options").put("max_gaussians", 0, 500);
     };
     let done = table.row(calls::reconstruct, "nothing as it is", set, Fine);
     let told = report(done.handle("out_report"));
@@ -1499,6 +1513,8 @@ fn options_reach_the_library() {
     assert!(told["calibration"].is_null() && told["relight"].is_null());
     assert_eq!((settings["resolution"].as_f64(), settings["max_views"].as_u64()), (Some(0.5), Some(1)));
     assert_eq!(told["views_used"].as_array().map(Vec::len), Some(1));
+    assert_eq!(settings["max_gaussians"], 500);
+    assert!(told["gaussians"].as_u64().is_some_and(|n| n <= 500), "{}", told["gaussians"]);
 }
 
 #[test]

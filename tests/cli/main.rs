@@ -6,11 +6,14 @@ mod errors;
 mod eval;
 mod hostile;
 mod info;
+#[cfg(unix)]
+mod interrupt;
 mod pareto;
 mod reconstruct;
 mod refine;
 mod render;
 mod report;
+mod results;
 #[cfg(target_os = "linux")]
 mod threads;
 #[cfg(target_os = "linux")]

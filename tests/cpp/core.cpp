@@ -245,7 +245,7 @@ void a_cloud_is_lent() {
     std::vector<std::array<float, 3>> cloud(5, {0.0F, 0.0F, 0.5F});
     vg::Options options;
     CHECK(options.cloud == nullptr && options.photo == 1 && options.budget_s == 0);
-    CHECK(options.resolution == 1 && options.max_views == 0);
+    CHECK(options.resolution == 1 && options.max_views == 0 && options.max_gaussians == 12000000);
     options.lend_cloud(cloud);
     CHECK(options.cloud == cloud[0].data() && options.cloud_count == 5);
     // Depth says all: the report tells how many points were not needed.

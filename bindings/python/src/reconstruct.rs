@@ -29,7 +29,8 @@ type Points<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>);
 #[pyfunction]
 #[pyo3(signature = (
     images, masks, cameras, depths, *, prior, prior_model, head_model, calibrate, symmetry, relight, photo, cloud,
-    vehicle_size, vehicle_place, sh_degree, keep, check, points, budget, resolution, max_views, refine_iterations,
+    vehicle_size, vehicle_place, sh_degree, keep, check, points, budget, resolution, max_views, max_gaussians,
+    refine_iterations,
     refine_seconds, refine_hold_out, refine_backend, threads, names, progress
 ))]
 pub(crate) fn reconstruct<'py>(
@@ -55,6 +56,7 @@ pub(crate) fn reconstruct<'py>(
     budget: Option<f64>,
     resolution: f64,
     #[pyo3(from_py_with = whole::max_views)] max_views: Option<usize>,
+    #[pyo3(from_py_with = whole::max_gaussians)] max_gaussians: Option<usize>,
     #[pyo3(from_py_with = whole::refine_iterations)] refine_iterations: Option<u32>,
     refine_seconds: Option<f64>,
     refine_hold_out: bool,
@@ -82,6 +84,7 @@ pub(crate) fn reconstruct<'py>(
         budget_s: budget,
         resolution,
         max_views,
+        max_gaussians,
         threads,
         points,
         refine: refinement(py, refine_iterations, refine_seconds, refine_hold_out, refine_backend)?,

@@ -149,6 +149,7 @@ def test_options_are_those_of_the_extension_module(ellipsoid: Views, made: vg.Re
         "budget": 1e6,
         "resolution": 0.75,
         "max_views": 3,
+        "max_gaussians": 5000,
         "refine_iterations": 3,
         "refine_hold_out": True,
         "refine_backend": "cpu",
@@ -156,7 +157,8 @@ def test_options_are_those_of_the_extension_module(ellipsoid: Views, made: vg.Re
     ours, theirs = vg.reconstruct(*views, **given), capi.reconstruct(*views, **given)
     assert same_bytes(ours.gaussians, theirs.gaussians)
     assert ours.report["cloud"] == theirs.report["cloud"] and ours.report["cloud"]["used"] > 0
-    for name in ("prior", "calibrate", "symmetry", "relight", "photo", "check", "resolution", "max_views"):
+    same = ("prior", "calibrate", "symmetry", "relight", "photo", "check", "resolution", "max_views", "max_gaussians")
+    for name in same:
         assert ours.report["settings"][name] == theirs.report["settings"][name] == given[name]
     refinement = ours.report["refinement"]
     assert refinement == theirs.report["refinement"] and refinement["iterations"] == 3
@@ -414,6 +416,12 @@ def test_errors_have_the_same_codes_and_texts(ellipsoid: Views, tmp_path: Path) 
     with pytest.raises(vg.VgError, match="no.ply") as caught:
         capi.Gaussians.load_ply(tmp_path / "no.ply")
     assert caught.value.code is Status.IO
+    for face, made in ((vg, vg.reconstruct), (capi, capi.reconstruct)):
+        car = made(ellipsoid.images, ellipsoid.masks, ellipsoid.cameras, ellipsoid.depths, check=False).gaussians
+        with pytest.raises(vg.VgError, match="car.spz, a name of SPZ.*ends in .ply") as caught:
+            car.save_ply(tmp_path / "car.spz")
+        assert caught.value.code is Status.ARGUMENT, face
+    assert not (tmp_path / "car.spz").exists()
     with pytest.raises(TypeError, match=r"^images\[0\]: array of float32; allowed: a NumPy array of uint8"):
         capi.reconstruct([np.zeros((4, 4, 3), np.float32)], None, ellipsoid.cameras[:1])
     with pytest.raises(TypeError, match=r"^depths\[0\]: array of int64; allowed: an array of floats, metres"):
@@ -429,6 +437,7 @@ def test_errors_have_the_same_codes_and_texts(ellipsoid: Views, tmp_path: Path) 
         ({"budget": -1}, "budget: -1"),
         ({"resolution": 0}, "resolution: 0; allowed: above 0, at most 1"),
         ({"max_views": 0}, "max_views: 0; allowed: at least 1"),
+        ({"max_gaussians": 0}, "max_gaussians: 0; allowed: at least 1"),
         ({"refine_iterations": 0}, "refine_iterations: 0; allowed: 1 to 1000000"),
         ({"refine_iterations": 2_000_000}, "refine_iterations: 2000000; allowed: at most 1000000"),
         ({"refine_seconds": 0}, "refine_seconds: 0; allowed: above 0, at most 86400"),

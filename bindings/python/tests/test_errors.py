@@ -117,6 +117,7 @@ OPTIONS: list[tuple[dict[str, Any], str]] = [
     ({"resolution": 0.0}, "resolution: 0; allowed: above 0, at most 1"),
     ({"resolution": float("nan")}, "resolution: NaN; allowed: above 0, at most 1"),
     ({"max_views": 0}, "max_views: 0; allowed: at least 1"),
+    ({"max_gaussians": 0}, "max_gaussians: 0; allowed: at least 1"),
     ({"refine_iterations": 0}, "refine_iterations: 0; allowed: 1 to 1000000"),
     ({"refine_iterations": 1_000_001}, "refine_iterations: 1000001; allowed: at most 1000000"),
     ({"refine_seconds": -1.0}, "refine_seconds: -1; allowed: above 0, at most 86400"),
@@ -162,6 +163,10 @@ def test_files_that_are_missing_or_broken(tmp_path: Path) -> None:
     (tmp_path / "bad.ply").write_text("ply or not")
     with pytest.raises(vg.VgError, match="bad.ply") as caught:
         vg.Gaussians.load_ply(tmp_path / "bad.ply")
+    assert caught.value.code is Status.FORMAT
+    (tmp_path / "car.spz").write_bytes(b"\x1f\x8b\x08\x00")
+    with pytest.raises(vg.VgError, match="car.spz: format: this is SPZ.*allowed: PLY; convert it") as caught:
+        vg.Gaussians.load_ply(tmp_path / "car.spz")
     assert caught.value.code is Status.FORMAT
     with pytest.raises(vg.VgError) as caught:
         vg.open_scene(tmp_path)

@@ -146,6 +146,7 @@ def test_options_reach_the_library(ellipsoid: Views) -> None:
         budget=1e6,
         resolution=0.5,
         max_views=2,
+        max_gaussians=600,
         refine_seconds=0.01,
         threads=1,
     )
@@ -160,6 +161,8 @@ def test_options_reach_the_library(ellipsoid: Views) -> None:
     assert (settings["calibrate"], settings["relight"]) == ("off", "never")
     assert made.report["plan"]["budget_s"] == 1e6
     assert (settings["resolution"], settings["max_views"]) == (0.5, 2)
+    assert settings["max_gaussians"] == 600 and 0 < len(made.gaussians) <= 600
+    assert any(left["what"] == "Gaussians" and "max_gaussians, 600" in left["why"] for left in made.report["left_out"])
     assert len(made.report["views_used"]) == 2
     assert made.report["refinement"]["iterations"] >= 4
     assert made.report["calibration"] is None and made.report["relight"] is None

@@ -2,8 +2,10 @@
 //! measured, from the vehicle's size, or from a matrix.
 
 use crate::args::{AlignArgs, Mode};
-use crate::files;
+use crate::files::{Kind, Results};
+use crate::guard::Inputs;
 use crate::job::{Failure, Outcome, Result};
+use crate::{files, shown};
 use std::fmt::Write;
 use std::path::Path;
 use vg::Error;
@@ -35,23 +37,24 @@ pub(crate) fn run(args: &AlignArgs) -> Result {
         Mode::Scan(_) | Mode::Box(_) => scan.clone(),
         Mode::Centers(path) | Mode::Matrix(path) => Some(path.to_owned()),
     };
-    files::refuse_clashes(std::slice::from_ref(&args.output), input.as_slice())?;
+    let results = Results::new([(Kind::Json, Some(&args.output))]);
+    results.prepare(&Inputs::of_alignment().files(&input).scene(&args.scene))?;
     let found = Threads::new(args.threads)?.run(|| match mode {
         Mode::Scan(_) => by_scan(args, scan.as_deref().unwrap_or(Path::new(""))),
         Mode::Centers(path) => by_centers(args, path),
         Mode::Box(size) => by_box(args, size),
         Mode::Matrix(path) => by_matrix(args, path),
     })?;
-    files::prepare(&args.output)?;
-    io::write_alignment(&args.output, &found.vehicle_from_world, found.quality)?;
-    let mut text = format!("{}: scale {:.6}", args.output.display(), found.vehicle_from_world.scale);
+    let similarity = io::alignment_text(&found.vehicle_from_world, found.quality)?;
+    files::write(&args.output, |out| out.write_all(similarity.as_bytes()))?;
+    let mut text = format!("{}: scale {:.6}", shown::path(&args.output), found.vehicle_from_world.scale);
     if let Some(quality) = found.quality {
         let _ = write!(text, ", residual {:.4} m, confidence {:.2}", quality.residual_m, quality.confidence);
     }
     found.lines.iter().for_each(|line| {
-        let _ = write!(text, "\n  {line}");
+        let _ = write!(text, "\n  {}", shown::line(line));
     });
-    Ok(Outcome::done(text))
+    Ok(results.outcome(Outcome::done(text)))
 }
 
 /// The similarity to a scan, of a file or of the scene's folder, and the masks it was found with.

@@ -5,9 +5,10 @@ use crate::contact::{self, Tile};
 use crate::eval::judge::OfVehicle;
 use crate::eval::measure::{self, Measured, Shown};
 use crate::eval::split;
+use crate::guard::{self, Inputs};
 use crate::job::{Failure, Outcome, Result};
 use crate::{files, reconstruct, render, sample, scene, shown};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use vg::View;
 use vg::io::{SceneOptions, ply};
 use vg::pipeline::{Options, PriorChoice};
@@ -17,13 +18,19 @@ use vg::render::{RenderOptions, Rendered};
 /// Four photographs of the right side in; the model, its left side and the errors there out.
 pub(crate) fn run(args: &DemoArgs) -> Result {
     let folder = &args.folder;
-    files::prepare_folder(folder)?;
     let (scene_folder, unseen) = (folder.join("scene"), folder.join("unseen"));
+    let [asset, points, report, sheet] =
+        ["asset.ply", "points.ply", "report.json", "contact.png"].map(|name| folder.join(name));
+    guard::refuse_clashes(&[&asset, &points, &report, &sheet].map(PathBuf::clone), &Inputs::default())?;
+    files::prepare_folder(folder)?;
     sample::write(&scene_folder)?;
-    files::prepare_folder(&unseen)?;
 
     let splits = split::read(&scene_folder.join("split.json"), None)?;
     let split = splits.into_values().next().ok_or_else(|| Failure::job("the sample has no split"))?;
+    let pictures: Vec<PathBuf> =
+        split.test.iter().map(|name| unseen.join(render::picture_name(name))).collect();
+    guard::refuse_clashes(&pictures, &Inputs::default().scene(&scene_folder))?;
+    files::prepare_folder(&unseen)?;
     // Photographs, masks and cameras are all this gets; the sample's depth is for the comparison below.
     let without_depth = SceneOptions { load_depth: false, ..SceneOptions::default() };
     let shape =
@@ -35,11 +42,11 @@ pub(crate) fn run(args: &DemoArgs) -> Result {
     let tests = scene::open(&scene_folder, &split.test, &without_depth, &threads)?;
     let (drawn, mut measured) = measure::judge(&made.gaussians, &tests.scene.views, &threads)?;
     measured.reconstruct_ms = Some(made.report.total_ms);
-    ply::write(&folder.join("asset.ply"), &made.gaussians)?;
+    ply::write(&asset, &made.gaussians)?;
     if let Some(cloud) = &made.points {
-        ply::write_points(&folder.join("points.ply"), &cloud.positions, &cloud.colors)?;
+        ply::write_points(&points, &cloud.positions, &cloud.colors)?;
     }
-    files::write_json(&folder.join("report.json"), &made.report)?;
+    files::write_json(&report, &made.report)?;
     let white = RenderOptions::default().background;
     for (view, picture) in tests.scene.views.iter().zip(&drawn) {
         render::write(&unseen.join(render::picture_name(&view.name)), picture, white)?;
@@ -49,7 +56,7 @@ pub(crate) fn run(args: &DemoArgs) -> Result {
         drawn.iter().map(rendered).collect(),
         tests.scene.views.iter().map(photograph).collect::<Vec<_>>(),
     ];
-    contact::write(&folder.join("contact.png"), &rows)?;
+    contact::write(&sheet, &rows)?;
 
     let given = Options { prior: PriorChoice::Given, ..shape.clone() };
     let shown = Shown::plain(&scene_folder, &without_depth);
@@ -102,7 +109,7 @@ fn text(folder: &Path, split: &split::Split, shape: &Measured, given: &Measured)
         row("silhouettes (--prior shape)", shape),
         row("the scene (--prior given)", given),
         "The second row is given the true depth of the inputs. Of the first row there are now,".into(),
-        format!("in {}:", folder.display()),
+        format!("in {}:", shown::path(folder)),
         files.join("\n"),
     ]
     .join("\n")

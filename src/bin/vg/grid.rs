@@ -1,5 +1,7 @@
 //! Numbers in rows: for a terminal, as Markdown, as CSV.
 
+use crate::shown;
+
 /// What stands for no number.
 const NONE: &str = "-";
 
@@ -39,9 +41,9 @@ impl Grid {
         Self { columns: columns.to_vec(), rows: Vec::new() }
     }
 
-    /// A row with a cell for each column.
+    /// A row with a cell for each column, each one line of text.
     pub(crate) fn push(&mut self, cells: impl Into<Vec<String>>) {
-        let cells = cells.into();
+        let cells: Vec<String> = cells.into().iter().map(|cell| shown::line(cell)).collect();
         debug_assert_eq!(cells.len(), self.columns.len());
         self.rows.push(cells);
     }
@@ -118,5 +120,14 @@ mod tests {
         assert_eq!(grid.text(), "a     number\nx, y     1.2\nz|         -");
         assert_eq!(grid.markdown(), "| a | number |\n| --- | ---: |\n| x, y | 1.2 |\n| z\\| | - |\n");
         assert_eq!(grid.csv(), "a,number,rare\n\"x, y\",1.2,\nz|,,\n");
+    }
+
+    #[test]
+    fn control_characters_are_escaped_in_every_kind_of_table() {
+        let mut grid = Grid::new(&[Column::Words("a")]);
+        grid.push(["x\u{1b}[2J\ny".into()]);
+        assert_eq!(grid.text(), "a\nx\\u{1b}[2J\\ny");
+        assert_eq!(grid.markdown(), "| a |\n| --- |\n| x\\u{1b}[2J\\ny |\n");
+        assert_eq!(grid.csv(), "a\nx\\u{1b}[2J\\ny\n");
     }
 }

@@ -1,13 +1,13 @@
 //! `vg info`: what is in a PLY file, and what looks wrong with it.
 
 use crate::args::InfoArgs;
+use crate::files;
 use crate::job::{Outcome, Result};
 use crate::shown;
 use std::fmt::Write;
-use vg::io::ply;
-use vg::io::ply::PlyNotes;
+use vg::Gaussians;
+use vg::io::ply::{self, Content, OtherGaussians, PlyNotes};
 use vg::render::options::ALPHA_THRESHOLD;
-use vg::{Error, Gaussians};
 
 /// Longest side that a vehicle may have, metres, as `--box` accepts it.
 const LARGEST_M: f32 = 30.0;
@@ -18,19 +18,22 @@ const SMALLEST_M: f32 = 0.1;
 /// The largest standard deviation a reconstruction makes, metres.
 const LARGEST_SCALE_M: f32 = 3.0;
 
-/// Gaussians, or else coloured points.
+/// A scale that no Gaussian of a vehicle has; exp of a small number of metres is above it.
+const SMALLEST_LINEAR_SCALE: f32 = 1.0;
+
+/// Opacities of logits from 0 to 1, the logistic function of which they are.
+const OPACITIES_OF_LINEAR: std::ops::RangeInclusive<f32> = 0.5..=0.731_06;
+
+/// So few opacities may all lie there by chance.
+const FEW: usize = 100;
+
+/// Gaussians, Gaussians that are not drawn, or coloured points.
 pub(crate) fn run(args: &InfoArgs) -> Result {
-    match ply::read(&args.file) {
-        Ok((gaussians, notes)) => Ok(Outcome::done(of_gaussians(&gaussians, &notes))),
-        // A PLY file without the properties of Gaussians may be a point cloud.
-        Err(Error::Format { path, field, reason }) if field.starts_with("property ") => {
-            match ply::read_points(&args.file) {
-                Ok((positions, _)) => Ok(Outcome::done(of_points(&positions))),
-                Err(_) => Err(Error::Format { path, field, reason }.into()),
-            }
-        }
-        Err(other) => Err(other.into()),
-    }
+    Ok(Outcome::done(match ply::read_content(files::input(&args.file))? {
+        Content::Gaussians(gaussians, notes) => of_gaussians(&gaussians, &notes),
+        Content::Others(others) => of_others(&others),
+        Content::Points((positions, _)) => of_points(&positions),
+    }))
 }
 
 fn of_gaussians(gaussians: &Gaussians, notes: &PlyNotes) -> String {
@@ -46,6 +49,14 @@ fn of_gaussians(gaussians: &Gaussians, notes: &PlyNotes) -> String {
         let _ = writeln!(text, "mean opacity: {mean:.3}");
     }
     text + &listed(&problems(gaussians, notes))
+}
+
+fn of_others(others: &OtherGaussians) -> String {
+    let mut text = format!("Gaussians: {}\nkind: {}\n", shown::count(others.count), others.kind);
+    text += &extent(others.bounds);
+    let mut problems = vec![format!("render and refine refuse it: {}", shown::line(&others.why))];
+    problems.extend(others.bounds.and_then(|bounds| implausible_size(Some(&bounds), false)));
+    text + &listed(&problems)
 }
 
 fn of_points(positions: &[[f32; 3]]) -> String {
@@ -77,12 +88,14 @@ fn listed(problems: &[String]) -> String {
 fn problems(gaussians: &Gaussians, notes: &PlyNotes) -> Vec<String> {
     let mut found = Vec::new();
     if !notes.ignored.is_empty() {
-        found.push(format!("properties that Gaussians do not have, ignored: {}", notes.ignored.join(", ")));
+        let names: Vec<String> = notes.ignored.iter().map(|name| shown::line(name)).collect();
+        found.push(format!("properties that Gaussians do not have, ignored: {}", names.join(", ")));
     }
     if notes.clamped_scales > 0 {
         found.push(format!("{} scales too small for a float, raised", shown::count(notes.clamped_scales)));
     }
     found.extend(implausible_size(gaussians.bounds().as_ref(), gaussians.is_empty()));
+    found.extend(linear_numbers(gaussians));
     let count = |test: &dyn Fn(usize) -> bool| (0..gaussians.len()).filter(|&i| test(i)).count();
     let invisible = count(&|i| gaussians.opacities()[i] < ALPHA_THRESHOLD);
     if invisible > 0 {
@@ -91,6 +104,24 @@ fn problems(gaussians: &Gaussians, notes: &PlyNotes) -> Vec<String> {
     let huge = count(&|i| gaussians.scales()[i].iter().any(|&s| s > LARGEST_SCALE_M));
     if huge > 0 {
         found.push(format!("{} Gaussians are larger than {LARGEST_SCALE_M} m", shown::count(huge)));
+    }
+    found
+}
+
+/// Signs that numbers were stored as they are, where the layout wants logarithms of scales and logits of opacities.
+pub(crate) fn linear_numbers(gaussians: &Gaussians) -> Vec<String> {
+    let mut found = Vec::new();
+    let smallest = gaussians.scales().as_flattened().iter().copied().fold(f32::INFINITY, f32::min);
+    if !gaussians.is_empty() && smallest >= SMALLEST_LINEAR_SCALE {
+        found.push(format!(
+            "every scale is {smallest:.3} m or more: are scale_0 to scale_2 metres and not their natural logarithms? \
+             The layout wants ln(0.01) = -4.6 for 1 cm"
+        ));
+    }
+    if gaussians.len() >= FEW && gaussians.opacities().iter().all(|o| OPACITIES_OF_LINEAR.contains(o)) {
+        found.push(
+            "every opacity lies between 0.5 and 0.73: are the numbers opacities and not their logits?".into(),
+        );
     }
     found
 }

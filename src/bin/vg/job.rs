@@ -1,5 +1,6 @@
 //! What a command leaves behind: text to print, or a failure with its exit code.
 
+use crate::shown;
 use std::io::Write;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -86,19 +87,17 @@ pub(crate) fn complain(message: &str) {
 /// `vg: <what>: <message>` on standard error.
 fn line(what: &str, message: &str) {
     // File names may hold line breaks and terminal commands.
-    let line: String = message
-        .chars()
-        .flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] })
-        .collect();
+    let line = shown::line(message);
     // Nobody is left to tell if this fails.
     let _ = writeln!(std::io::stderr(), "vg: {what}: {line}");
 }
 
-/// Writes the outcome's text to standard output. A reader that has gone away (`vg info x | head -1`) has what it
+/// Writes the outcome's text to standard output; what is left of control characters but the line feed is escaped. A reader that has gone away (`vg info x | head -1`) has what it
 /// wanted.
 pub(crate) fn print(outcome: &Outcome) -> Result<Outcome> {
     let mut out = std::io::stdout().lock();
-    let written = if outcome.text.is_empty() { Ok(()) } else { writeln!(out, "{}", outcome.text) };
+    let lines: Vec<String> = outcome.text.split('\n').map(shown::line).collect();
+    let written = if outcome.text.is_empty() { Ok(()) } else { writeln!(out, "{}", lines.join("\n")) };
     match written.and_then(|()| out.flush()) {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
             Err(Failure::job(format!("standard output: {e}")))

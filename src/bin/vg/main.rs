@@ -11,7 +11,9 @@ mod demo;
 mod eval;
 mod files;
 mod grid;
+mod guard;
 mod info;
+mod interrupt;
 mod job;
 mod memory;
 mod pareto;
@@ -30,6 +32,7 @@ use job::{Failure, Outcome};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    interrupt::watch();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => return usage(&error),
@@ -45,6 +48,10 @@ fn main() -> ExitCode {
         Command::Demo(args) => demo::run(args),
         Command::Align(args) => align::run(args),
     };
+    // A job that was told to end has nothing to say of it.
+    if let Some(code) = interrupt::code() {
+        return code;
+    }
     if outcome.is_ok() {
         job::warn();
     }

@@ -5,26 +5,29 @@ use std::ffi::OsString;
 use std::process::{Command, Stdio};
 use vg::geometry::Similarity;
 
-/// Runs `vg reconstruct` with these words, in this frame, and returns the highest resident memory of that process, bytes; `None` where
-/// it fails or the system does not tell.
+/// Takes what is written, on every system that has one.
+const NOWHERE: &str = if cfg!(windows) { "NUL" } else { "/dev/null" };
+
+/// Runs `vg reconstruct` with these words, in this frame, and returns the highest resident memory of that process, bytes;
+/// `None` where it fails or the system does not tell. The process writes no file, and ends when this one does.
 pub(crate) fn of_reconstruction(
     words: impl IntoIterator<Item = OsString>,
     frame: Option<&Similarity>,
 ) -> Option<u64> {
-    let folder = tempfile::tempdir().ok()?;
-    let report = folder.path().join("report.json");
     let mut command = Command::new(std::env::current_exe().ok()?);
     command.arg("reconstruct").args(words);
-    command.arg("--output").arg(folder.path().join("asset.ply")).arg("--report").arg(&report);
+    command.args(["--output", NOWHERE, "--report", "-", "--end-with-input"]);
     if let Some(frame) = frame {
-        let file = folder.path().join("frame.json");
-        vg::io::write_vehicle_from_world(&file, frame).ok()?;
-        command.arg("--vehicle-from-world").arg(file);
+        command.arg(format!("--frame-matrix={:?}", frame.to_row_major()));
     }
-    let ended = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status().ok()?;
-    if !ended.success() {
+    let mut child =
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().ok()?;
+    // Held until the process has ended.
+    let _input = child.stdin.take();
+    let ended = child.wait_with_output().ok()?;
+    if !ended.status.success() {
         return None;
     }
-    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(report).ok()?).ok()?;
+    let report: serde_json::Value = serde_json::from_slice(&ended.stdout).ok()?;
     report["peak_rss_bytes"].as_u64()
 }

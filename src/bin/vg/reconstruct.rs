@@ -1,10 +1,13 @@
 //! `vg reconstruct`: a scene in, a model out.
 
 use crate::args::{ReconstructArgs, Strict, StrictArgs};
+use crate::files::{Kind, Results};
+use crate::guard::Inputs;
 use crate::job::{Failure, Outcome, Result, note};
 use crate::shown::Bar;
-use crate::{cloud, files, scene, shown};
-use vg::io::ply;
+use crate::{cloud, files, interrupt, scene, shown};
+use std::path::Path;
+use vg::io::{ply, vehicle_frame};
 use vg::onnx::Model;
 use vg::pipeline::{self, CheckedView, InputError, Options, Reconstruction, Report, Verdict};
 use vg::progress::Threads;
@@ -13,25 +16,24 @@ use vg::{Scene, View, io};
 
 /// Opens, reconstructs, writes.
 pub(crate) fn run(args: &ReconstructArgs) -> Result {
-    let outputs: Vec<_> = [Some(&args.output), args.points.as_ref(), args.report.as_ref()]
-        .into_iter()
-        .flatten()
-        .cloned()
-        .collect();
+    if args.end_with_input {
+        interrupt::end_with_input();
+    }
     // Depth that will not be used is not read either.
-    let options = scene::options(&args.frame, args.depth.depth_scale, args.method.wants_depth())?;
+    let mut options = scene::options(&args.frame, args.depth.depth_scale, args.method.wants_depth())?;
+    if let Some(frame) = &args.frame_matrix {
+        options.vehicle_from_world =
+            Some(vehicle_frame::parse_matrix(frame.as_bytes(), Path::new("--frame-matrix"))?);
+    }
     let index = io::list_scene(&args.scene, &scene::named(args.views.views.as_deref(), &options))?;
-    let read: Vec<_> = scene::files_of(&index)
-        .into_iter()
-        .chain(
-            [&args.method.cloud, &args.method.prior_model, &args.method.head_model, &args.mask_model]
-                .into_iter()
-                .flatten()
-                .cloned(),
-        )
-        .collect();
-    files::refuse_clashes(&outputs, &read)?;
-    outputs.iter().try_for_each(|path| files::prepare(path))?;
+    let results = Results::new([
+        (Kind::Ply, Some(&args.output)),
+        (Kind::Ply, args.points.as_ref()),
+        (Kind::Json, args.report.as_ref()),
+    ]);
+    let inputs = Inputs::default().files(&scene::files_of(&index)).files(args.method.files());
+    let inputs = inputs.files(&args.mask_model).files(&args.frame.vehicle_from_world);
+    results.prepare(&inputs.scene(&args.scene))?;
 
     let threads = Threads::new(args.method.threads)?;
     let mut opened = scene::load(index, &threads)?;
@@ -41,19 +43,15 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
     let made = reconstruct(&opened.scene, &settings, &threads)?;
     note_warnings(&made.report);
     accept(&made.report, &args.strict)?;
-    ply::write(&args.output, &made.gaussians)?;
+    files::write(&args.output, |out| ply::write_to(out, &made.gaussians))?;
     if let (Some(path), Some(cloud)) = (&args.points, &made.points) {
-        ply::write_points(path, &cloud.positions, &cloud.colors)?;
+        files::write(path, |out| ply::write_points_to(out, &cloud.positions, &cloud.colors))?;
     }
     if let Some(path) = &args.report {
         files::write_json(path, &made.report)?;
     }
-    Ok(Outcome::done(format!(
-        "{}: {}{masks_by}{}",
-        args.output.display(),
-        summary(&made),
-        views(&made.report)
-    )))
+    let text = format!("{}: {}{masks_by}{}", shown::path(&args.output), summary(&made), views(&made.report));
+    Ok(results.outcome(Outcome::done(text)))
 }
 
 /// What a user should hear of a reconstruction that went well.
@@ -64,6 +62,9 @@ pub(crate) fn note_warnings(report: &Report) {
     let of_network = report.network.iter().flat_map(|network| &network.warnings);
     for warning in report.warnings.iter().chain(of_network) {
         note(warning);
+    }
+    for left in report.left_out.iter().filter(|left| left.what == pipeline::GAUSSIANS) {
+        note(&format!("{}; --max-gaussians N allows more, --resolution SHARE chooses another", left.why));
     }
 }
 

@@ -1,9 +1,11 @@
 //! `vg refine`: a model and photographs in, the model moved towards the photographs out.
 
 use crate::args::RefineArgs;
+use crate::files::{Kind, Results};
+use crate::guard::Inputs;
 use crate::job::{self, Failure, Outcome, Result};
 use crate::shown::{self, Bar};
-use crate::{files, scene};
+use crate::{files, info, scene};
 use serde::Serialize;
 use vg::io::{self, ply};
 use vg::progress::Threads;
@@ -21,13 +23,12 @@ struct Document<'a> {
 pub(crate) fn run(args: &RefineArgs) -> Result {
     let options = scene::options(&args.frame, None, false)?;
     let index = io::list_scene(&args.scene, &scene::named(args.views.views.as_deref(), &options))?;
-    let outputs: Vec<_> = [Some(&args.output), args.report.as_ref()].into_iter().flatten().cloned().collect();
-    let mut inputs = scene::files_of(&index);
-    inputs.push(args.asset.clone());
-    files::refuse_clashes(&outputs, &inputs)?;
-    outputs.iter().try_for_each(|path| files::prepare(path))?;
+    let results = Results::new([(Kind::Ply, Some(&args.output)), (Kind::Json, args.report.as_ref())]);
+    let inputs = Inputs::default().files(&scene::files_of(&index)).files([&args.asset]);
+    results.prepare(&inputs.files(&args.frame.vehicle_from_world).scene(&args.scene))?;
 
-    let (gaussians, _) = ply::read(&args.asset)?;
+    let (gaussians, _) = ply::read(files::input(&args.asset))?;
+    info::linear_numbers(&gaussians).iter().for_each(|sign| job::note(sign));
     if gaussians.is_empty() {
         return Err(Failure::job(format!("{}: no Gaussians to refine", args.asset.display())));
     }
@@ -49,13 +50,14 @@ pub(crate) fn run(args: &RefineArgs) -> Result {
         Stop::Diverged => job::note("the error grew; the best of the states before is returned"),
         Stop::Done | Stop::HeldOut => {}
     }
-    ply::write(&args.output, &refined)?;
+    files::write(&args.output, |out| ply::write_to(out, &refined))?;
     if let Some(path) = &args.report {
         let version = env!("CARGO_PKG_VERSION");
         files::write_json(path, &Document { version, settings: &settings, refinement: &done })?;
     }
     let gaussians = shown::count(refined.len());
-    Ok(Outcome::done(format!("{}: {gaussians} Gaussians, {}", args.output.display(), summary(&done))))
+    let text = format!("{}: {gaussians} Gaussians, {}", shown::path(&args.output), summary(&done));
+    Ok(results.outcome(Outcome::done(text)))
 }
 
 /// One line.

@@ -1,9 +1,10 @@
 //! `vg render`: a model as a scene's cameras see it, or from all around.
 
 use crate::args::RenderArgs;
+use crate::guard::{self, Inputs};
 use crate::job::{self, Failure, Outcome, Result};
-use crate::shown::Bar;
-use crate::{files, scene};
+use crate::shown::{self, Bar};
+use crate::{files, info, scene};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,14 +16,15 @@ use vg::{Camera, Gaussians};
 
 /// Reads the model, draws it into every camera.
 pub(crate) fn run(args: &RenderArgs) -> Result {
-    let (gaussians, _) = ply::read(&args.asset)?;
-    let mut inputs = vec![args.asset.clone()];
+    let (gaussians, _) = ply::read(files::input(&args.asset))?;
+    info::linear_numbers(&gaussians).iter().for_each(|sign| job::note(sign));
+    let mut inputs = Inputs::default().files([&args.asset]).files(&args.frame.vehicle_from_world);
     let cameras = match (&args.cameras, args.turntable) {
         (Some(path), _) => {
             // The cameras alone: neither pictures nor depth need exist.
             let options = scene::options(&args.frame, None, true)?;
             let index = io::list_scene(path, &scene::named(args.views.views.as_deref(), &options))?;
-            inputs.extend(scene::files_of(&index));
+            inputs = inputs.files(&scene::files_of(&index)).scene(path);
             index.cameras()
         }
         (None, n) => turntable(&gaussians, n.unwrap_or(1), args.size)?,
@@ -33,8 +35,11 @@ pub(crate) fn run(args: &RenderArgs) -> Result {
         true => cameras.iter().map(|c| depth_folder.join(picture_name(&c.name))).collect(),
         false => Vec::new(),
     };
-    files::refuse_clashes(&[pictures.as_slice(), &depths].concat(), &inputs)?;
-    files::prepare_folder(if args.depth { &depth_folder } else { &args.output })?;
+    guard::refuse_clashes(&[pictures.as_slice(), &depths].concat(), &inputs)?;
+    files::prepare_folder(&args.output)?;
+    if args.depth {
+        files::prepare_folder(&depth_folder)?;
+    }
 
     let options = RenderOptions { background: args.background, ..RenderOptions::default() };
     let threads = Threads::new(args.threads)?;
@@ -73,7 +78,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result {
         threads.run(|| ready.render_each(&seen, &options, &mut Rgba8::default(), each))?;
     }
     drop(bar);
-    let (folder, n) = (args.output.display(), cameras.len());
+    let (folder, n) = (shown::path(&args.output), cameras.len());
     let pictures = if n == 1 { "picture" } else { "pictures" };
     Ok(Outcome::done(format!("{folder}: {n} {pictures} by {}", ready.choice())))
 }

@@ -1,7 +1,7 @@
 //! The sample inside this program: the scene of tests/data/sedan, so that the demo needs no file and no network.
 
 use crate::files;
-use crate::job::Result;
+use crate::job::{Failure, Result};
 use std::path::Path;
 
 macro_rules! sample {
@@ -21,12 +21,21 @@ const FILES: &[(&str, &[u8])] = sample![
     "sparse/0/cameras.bin" "sparse/0/images.bin" "sparse/0/points3D.bin"
 ];
 
-/// Writes the scene into this folder.
+/// Writes the scene into this folder, unless it is there. Files of these names that are not the sample's are somebody's
+/// scene, of which nothing is replaced.
 pub(crate) fn write(folder: &Path) -> Result<()> {
-    for (path, bytes) in FILES {
+    let missing: Vec<_> = FILES.iter().filter(|(path, _)| !folder.join(path).exists()).collect();
+    for (path, bytes) in FILES.iter().filter(|(path, _)| folder.join(path).exists()) {
         let path = folder.join(path);
-        files::prepare(&path)?;
-        files::write(&path, bytes)?;
+        if std::fs::read(&path).ok().as_deref() != Some(*bytes) {
+            let message = "is not the sample's and would be replaced; choose another folder for the demo";
+            return Err(Failure::job(format!("{}: {message}", path.display())));
+        }
+    }
+    for (path, bytes) in missing {
+        let path = folder.join(path);
+        path.parent().map_or(Ok(()), files::prepare_folder)?;
+        files::write(&path, |out| out.write_all(bytes))?;
     }
     Ok(())
 }

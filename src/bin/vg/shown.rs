@@ -1,7 +1,8 @@
-//! Progress on a terminal, and numbers as people read them.
+//! Progress on a terminal, and text and numbers as people read them.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::ops::ControlFlow;
+use std::path::Path;
 use vg::progress::Progress;
 
 /// Steps of the bar of a reconstruction: finer than columns of a terminal.
@@ -58,6 +59,23 @@ impl Drop for Bar {
     }
 }
 
+/// Whether a character is nothing but text: no command to a terminal, no line break, no turn of the direction of writing.
+pub(crate) fn is_plain(c: char) -> bool {
+    let turns = matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    !(c.is_control() || turns || matches!(c, '\u{2028}' | '\u{2029}'))
+}
+
+/// Text from elsewhere on one line; characters that are not plain become escapes, `\u{1b}`.
+pub(crate) fn line(text: &str) -> String {
+    let one = |c: char| if is_plain(c) { vec![c] } else { c.escape_default().collect() };
+    text.chars().flat_map(one).collect()
+}
+
+/// A file's name on one line.
+pub(crate) fn path(path: &Path) -> String {
+    line(&path.display().to_string())
+}
+
 /// `1 234 567`
 pub(crate) fn count(n: usize) -> String {
     let digits = n.to_string();
@@ -82,4 +100,15 @@ pub(crate) fn size(vehicle: &vg::pipeline::VehicleSize) -> String {
     let [l, w, h] = vehicle.size_m;
     let worst = vehicle.uncertainty_m.into_iter().fold(0.0, f64::max);
     format!("{l:.2} x {w:.2} x {h:.2} m (± {worst:.2})")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commands_to_a_terminal_and_turned_text_become_escapes_and_letters_stay() {
+        assert_eq!(line("a\u{1b}[31m\n\u{9b}\u{202e}gnp.exe"), "a\\u{1b}[31m\\n\\u{9b}\\u{202e}gnp.exe");
+        assert_eq!(line("Käfer 車 🚗 \\ \""), "Käfer 車 🚗 \\ \"");
+    }
 }

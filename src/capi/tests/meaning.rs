@@ -73,7 +73,7 @@ fn each_option_of_a_reconstruction_sets_its_namesake() {
         (options.vehicle_size, options.has_vehicle_place) = ([4.5, 1.75, 1.5], 1);
         options
     }
-    let effects: [Set<vg_options, Options>; 20] = [
+    let effects: [Set<vg_options, Options>; 21] = [
         ("prior", |o| o.prior = vg_prior::Hull as i32, |r| r.prior == PriorChoice::Hull),
         ("symmetry", |o| o.symmetry = vg_symmetry::Never as i32, |r| format!("{:?}", r.symmetry) == "Never"),
         ("sh_degree", |o| o.sh_degree = 1, |r| r.sh_degree == 1),
@@ -93,6 +93,7 @@ fn each_option_of_a_reconstruction_sets_its_namesake() {
         ("photo", |o| o.photo = 0, |r| !r.photo),
         ("budget_s", |o| o.budget_s = 2.5, |r| r.budget_s == Some(2.5)),
         ("resolution", |o| o.resolution = 0.5, |r| r.resolution == 0.5),
+        ("max_gaussians", |o| o.max_gaussians = 7, |r| r.max_gaussians == Some(7)),
         ("max_views", |o| o.max_views = 3, |r| r.max_views == Some(3)),
         (
             "refine_seconds",

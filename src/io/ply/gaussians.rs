@@ -4,15 +4,17 @@
 //! a logit, scales are natural logarithms of metres, rot is (w, x, y, z), and `f_rest` is channel-major: all of
 //! red's coefficients above degree 0, then green's, then blue's.
 
+use super::foreign;
 use super::header::{self, Header, Property};
 use super::rows::{self, finite};
+use super::variant::Variant;
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
 use crate::gaussians::buffer::{SCALE_RANGE, normalize_quaternion};
 use crate::gaussians::sh;
 use crate::io::files::write_atomically;
-use std::fs::File;
-use std::io::{BufRead, BufReader, Write};
+use crate::io::stream;
+use std::io::{BufRead, Write};
 use std::path::Path;
 
 /// A logit that the logistic function takes to exactly 1 in f32: above ln(2^25), where 1 + exp(-x) rounds to 1.
@@ -30,24 +32,37 @@ pub struct PlyNotes {
     pub ignored: Vec<String>,
 }
 
-/// The Gaussians in a PLY file. Properties may come in any order and of any scalar type, with others between.
+/// The Gaussians in a PLY file. Properties may come in any order and of any scalar type, with others between. The file
+/// may be a pipe: it is read once, from front to back. Other formats, and Gaussians of other kinds, are errors that name
+/// them and the way out.
 pub fn read(path: &Path) -> Result<(Gaussians, PlyNotes)> {
-    let file = File::open(path).map_err(|e| Error::io(path, e))?;
-    let length = file.metadata().map_err(|e| Error::io(path, e))?.len();
-    read_from(BufReader::with_capacity(1 << 16, file), length, path)
+    let stream = stream::open(path)?;
+    read_stream(stream.input, stream.length, path)
 }
 
 /// The same from any source of `length` bytes; `path` is for messages only.
-pub fn read_from(mut input: impl BufRead, length: u64, path: &Path) -> Result<(Gaussians, PlyNotes)> {
-    let header = header::read(&mut input, length, path)?;
-    let layout = Layout::of(&header, path)?;
-    let mut notes = PlyNotes { ignored: layout.ignored(&header), ..PlyNotes::default() };
+pub fn read_from(input: impl BufRead, length: u64, path: &Path) -> Result<(Gaussians, PlyNotes)> {
+    read_stream(input, Some(length), path)
+}
 
-    let n = header.vertices;
+fn read_stream(input: impl BufRead, length: Option<u64>, path: &Path) -> Result<(Gaussians, PlyNotes)> {
+    let (header, input) = header::open(input, length, path)?;
+    read_rows(input, &header, &Layout::of(&header, path)?, path)
+}
+
+/// The Gaussians that follow a header.
+pub(super) fn read_rows(
+    input: impl BufRead,
+    header: &Header,
+    layout: &Layout,
+    path: &Path,
+) -> Result<(Gaussians, PlyNotes)> {
+    let mut notes = PlyNotes { ignored: layout.ignored(header), ..PlyNotes::default() };
+    let n = header.reserve;
     let (mut means, mut rotations) = (Vec::with_capacity(n), Vec::with_capacity(n));
     let (mut scales, mut opacities) = (Vec::with_capacity(n), Vec::with_capacity(n));
     let mut colors = Vec::with_capacity(n * layout.sh.len());
-    rows::for_each(input, &header, path, |vertex, row| {
+    rows::for_each(input, header, path, |vertex, row| {
         let broken =
             |name: &str, reason: String| Error::format(path, format!("vertex {vertex}.{name}"), reason);
         let get = |property: &Property| finite(row, property, vertex, path);
@@ -97,7 +112,7 @@ fn scale_of_log(log: f64, clamped: &mut usize) -> Option<f32> {
 }
 
 /// Where each part of a Gaussian lies in a row.
-struct Layout<'a> {
+pub(super) struct Layout<'a> {
     mean: [&'a Property; 3],
     scale: [&'a Property; 3],
     rotation: [&'a Property; 4],
@@ -108,19 +123,29 @@ struct Layout<'a> {
 }
 
 impl<'a> Layout<'a> {
-    fn of(header: &'a Header, path: &Path) -> Result<Self> {
+    pub(super) fn of(header: &'a Header, path: &Path) -> Result<Self> {
+        let variant = Variant::of(header);
         let find = |name: &str| {
-            let missing =
-                || Error::format(path, format!("property {name}"), "missing; allowed: 3DGS's layout");
+            let missing = || {
+                let reason = match variant {
+                    Some(v) => {
+                        format!("missing: this is {}; allowed: 3DGS's layout; {}", v.kind(), v.way_out())
+                    }
+                    None => "missing; allowed: 3DGS's layout".into(),
+                };
+                Error::format(path, format!("property {name}"), reason)
+            };
             header.find(name).ok_or_else(missing)
         };
+        let mean = [find("x")?, find("y")?, find("z")?];
         let degree = match header.properties.iter().filter(|p| p.name.starts_with("f_rest_")).count() {
             0 => 0,
             9 => 1,
             24 => 2,
             45 => 3,
             n => {
-                let reason = format!("{n} of them; allowed: 0, 9, 24 or 45 (SH degree 0 to 3)");
+                let kind = variant.map_or_else(String::new, |v| format!(", {}: {}", v.kind(), v.way_out()));
+                let reason = format!("{n} of them{kind}; allowed: 0, 9, 24 or 45 (SH degree 0 to 3)");
                 return Err(Error::format(path, "property f_rest_*", reason));
             }
         };
@@ -132,7 +157,7 @@ impl<'a> Layout<'a> {
             }
         }
         Ok(Self {
-            mean: [find("x")?, find("y")?, find("z")?],
+            mean,
             scale: [find("scale_0")?, find("scale_1")?, find("scale_2")?],
             rotation: [find("rot_0")?, find("rot_1")?, find("rot_2")?, find("rot_3")?],
             opacity: find("opacity")?,
@@ -150,8 +175,10 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// Writes the Gaussians to `path`, replacing what was there only once the file is complete.
+/// Writes the Gaussians to `path`, replacing what was there only once the file is complete. A name that ends like that
+/// of another format, car.spz, is an error.
 pub fn write(path: &Path, gaussians: &Gaussians) -> Result<()> {
+    foreign::refuse_name(path)?;
     write_atomically(path, |out| write_to(out, gaussians))
 }
 

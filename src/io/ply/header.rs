@@ -1,7 +1,8 @@
 //! The header of a PLY file: which properties a vertex has, of which type, and where the rows are.
 
+use super::foreign::{self, FIRST_BYTES};
 use crate::error::{Error, Result};
-use std::io::{BufRead, Read};
+use std::io::{BufRead, Cursor, Read};
 use std::path::Path;
 
 /// Longest header that is read; that of Gaussians of degree 3 takes some 1600 bytes.
@@ -9,6 +10,12 @@ const MAX_HEADER: u64 = 1 << 20;
 
 /// More properties than any writer's; the search for repeated names is quadratic.
 const MAX_PROPERTIES: usize = 1024;
+
+/// Most vertices, so that they can be counted in an i32 everywhere.
+const MAX_VERTICES: u64 = i32::MAX as u64;
+
+/// Vertices that memory is reserved for where the length of the input is unknown.
+const RESERVED: usize = 1 << 16;
 
 /// Type of a scalar property, by either of its names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,6 +71,8 @@ pub(super) struct Header {
     pub(super) row_bytes: usize,
     /// Bytes of other elements between the header and the vertices.
     pub(super) skip: u64,
+    /// Vertices to reserve memory for before the first is read: nothing is allocated on a promise.
+    pub(super) reserve: usize,
 }
 
 impl Header {
@@ -73,9 +82,22 @@ impl Header {
     }
 }
 
-/// Reads up to and including `end_header`. `length` is the whole file's: the rows that the header promises must
-/// fit in it, so that nothing is allocated on a promise.
-pub(super) fn read(input: &mut impl BufRead, length: u64, path: &Path) -> Result<Header> {
+/// Reads up to and including `end_header`, and returns what follows with it. `length` is the whole file's, where it is
+/// known: the rows that the header promises must fit in it.
+pub(super) fn open<R: BufRead>(
+    mut input: R,
+    length: Option<u64>,
+    path: &Path,
+) -> Result<(Header, impl BufRead + use<R>)> {
+    let mut first = Vec::new();
+    (&mut input).take(FIRST_BYTES as u64).read_to_end(&mut first).map_err(|e| Error::io(path, e))?;
+    foreign::refuse(&first, path)?;
+    let mut input = Cursor::new(first).chain(input);
+    let header = read(&mut input, length, path)?;
+    Ok((header, input))
+}
+
+fn read(input: &mut impl BufRead, length: Option<u64>, path: &Path) -> Result<Header> {
     let error = |field: &str, reason: String| Error::format(path, field, reason);
     let mut lines = Lines { input: input.take(MAX_HEADER), consumed: 0 };
     if lines.next(path)? != "ply" {
@@ -83,7 +105,11 @@ pub(super) fn read(input: &mut impl BufRead, length: u64, path: &Path) -> Result
     }
     let format = lines.next(path)?;
     if format != "format binary_little_endian 1.0" {
-        return Err(error("format", format!("{format:?}; allowed: format binary_little_endian 1.0")));
+        let way_out = "convert it: `splat-transform IN.ply OUT.ply`, or save it as binary, little-endian";
+        return Err(error(
+            "format",
+            format!("{format:?}; allowed: format binary_little_endian 1.0; {way_out}"),
+        ));
     }
     let elements = read_elements(&mut lines, path)?;
 
@@ -97,16 +123,20 @@ pub(super) fn read(input: &mut impl BufRead, length: u64, path: &Path) -> Result
         skip = skip.saturating_add(element.count.saturating_mul(element.row_bytes as u64));
     }
     let vertex = vertex.ok_or_else(|| error("element vertex", "missing; allowed: one".into()))?;
-    let available = length.saturating_sub(lines.consumed).saturating_sub(skip);
-    let needed = vertex.count.checked_mul(vertex.row_bytes as u64);
-    if vertex.row_bytes == 0 || needed.is_none_or(|n| n > available) {
-        let reason =
-            format!("{} rows of {} bytes, but {available} bytes follow", vertex.count, vertex.row_bytes);
+    let Element { count, properties, row_bytes, .. } = vertex;
+    let available = length.map(|length| length.saturating_sub(lines.consumed).saturating_sub(skip));
+    let needed = count.checked_mul(row_bytes as u64);
+    if row_bytes == 0 || available.is_some_and(|available| needed.is_none_or(|n| n > available)) {
+        let follow = available.map_or_else(|| "some".into(), |n| n.to_string());
+        let reason = format!("{count} rows of {row_bytes} bytes, but {follow} bytes follow");
         return Err(error("element vertex", reason));
     }
-    // The count is at most the file's length in bytes.
-    let Element { count, properties, row_bytes, .. } = vertex;
-    Ok(Header { vertices: count as usize, properties, row_bytes, skip })
+    if count > MAX_VERTICES {
+        return Err(error("element vertex", format!("{count}; allowed: at most {MAX_VERTICES}")));
+    }
+    let vertices = count as usize;
+    let reserve = if length.is_some() { vertices } else { vertices.min(RESERVED) };
+    Ok(Header { vertices, properties, row_bytes, skip, reserve })
 }
 
 /// One element of the header.

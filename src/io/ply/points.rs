@@ -1,35 +1,41 @@
 //! Coloured point clouds: `x y z` float, `red green blue` uchar.
 
-use super::header;
+use super::foreign;
+use super::header::{self, Header};
 use super::rows::{self, finite};
 use crate::error::{Error, Result};
 use crate::io::files::write_atomically;
-use std::fs::File;
-use std::io::{BufRead, BufReader};
+use crate::io::stream;
+use std::io::{BufRead, Write};
 use std::path::Path;
 
 /// Positions and their colours, equally many.
 pub type ColoredPoints = (Vec<[f32; 3]>, Vec<[u8; 3]>);
 
-/// The point cloud in a PLY file; points without colour are mid-grey.
+/// The point cloud in a PLY file, which may be a pipe; points without colour are mid-grey.
 pub fn read_points(path: &Path) -> Result<ColoredPoints> {
-    let file = File::open(path).map_err(|e| Error::io(path, e))?;
-    let length = file.metadata().map_err(|e| Error::io(path, e))?.len();
-    read_points_from(BufReader::with_capacity(1 << 16, file), length, path)
+    let stream = stream::open(path)?;
+    let (header, input) = header::open(stream.input, stream.length, path)?;
+    read_rows(input, &header, path)
 }
 
 /// The same from any source of `length` bytes; `path` is for messages only.
-pub fn read_points_from(mut input: impl BufRead, length: u64, path: &Path) -> Result<ColoredPoints> {
-    let header = header::read(&mut input, length, path)?;
+pub fn read_points_from(input: impl BufRead, length: u64, path: &Path) -> Result<ColoredPoints> {
+    let (header, input) = header::open(input, Some(length), path)?;
+    read_rows(input, &header, path)
+}
+
+/// The points that follow a header.
+pub(super) fn read_rows(input: impl BufRead, header: &Header, path: &Path) -> Result<ColoredPoints> {
     let find = |name: &str| {
         let missing = || Error::format(path, format!("property {name}"), "missing; allowed: x y z");
         header.find(name).ok_or_else(missing)
     };
     let position = [find("x")?, find("y")?, find("z")?];
     let color = ["red", "green", "blue"].map(|name| header.find(name));
-    let mut positions = Vec::with_capacity(header.vertices);
-    let mut colors = Vec::with_capacity(header.vertices);
-    rows::for_each(input, &header, path, |vertex, row| {
+    let mut positions = Vec::with_capacity(header.reserve);
+    let mut colors = Vec::with_capacity(header.reserve);
+    rows::for_each(input, header, path, |vertex, row| {
         let get = |k: usize| finite(row, position[k], vertex, path);
         positions.push([get(0)?, get(1)?, get(2)?]);
         // `as` saturates.
@@ -39,26 +45,36 @@ pub fn read_points_from(mut input: impl BufRead, length: u64, path: &Path) -> Re
     Ok((positions, colors))
 }
 
-/// Writes a point cloud, replacing what was there only once the file is complete.
+/// Writes a point cloud, replacing what was there only once the file is complete. A name that ends like that of another
+/// format, car.las, is an error.
 pub fn write_points(path: &Path, positions: &[[f32; 3]], colors: &[[u8; 3]]) -> Result<()> {
+    foreign::refuse_name(path)?;
     if positions.len() != colors.len() {
         let allowed = format!("{}, one a position", positions.len());
         return Err(Error::argument("colors", colors.len().to_string(), allowed));
     }
-    write_atomically(path, |out| {
-        write!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}\n", positions.len())?;
-        out.write_all(b"property float x\nproperty float y\nproperty float z\n")?;
-        out.write_all(b"property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n")?;
-        for (position, color) in positions.iter().zip(colors) {
-            let mut row = [0; 15];
-            for k in 0..3 {
-                row[4 * k..4 * k + 4].copy_from_slice(&position[k].to_le_bytes());
-            }
-            row[12..].copy_from_slice(color);
-            out.write_all(&row)?;
+    write_atomically(path, |out| write_points_to(out, positions, colors))
+}
+
+/// Writes as many points as there are both positions and colours, a row at a time.
+pub fn write_points_to(
+    out: &mut dyn Write,
+    positions: &[[f32; 3]],
+    colors: &[[u8; 3]],
+) -> std::io::Result<()> {
+    let points = positions.len().min(colors.len());
+    write!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {points}\n")?;
+    out.write_all(b"property float x\nproperty float y\nproperty float z\n")?;
+    out.write_all(b"property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n")?;
+    for (position, color) in positions.iter().zip(colors) {
+        let mut row = [0; 15];
+        for k in 0..3 {
+            row[4 * k..4 * k + 4].copy_from_slice(&position[k].to_le_bytes());
         }
-        Ok(())
-    })
+        row[12..].copy_from_slice(color);
+        out.write_all(&row)?;
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -1565,6 +1565,7 @@ fn options(context: usize) -> Lent {
         refine_backend: choice_without(&[0, 1], 2),
         refine_flags: reserved(),
         progress_overall: elsewhere(),
+        max_gaussians: [0, 100_000, 1 << 60, u64::MAX].map(|n| (n, Fine)).to_vec(),
     });
     let mut lent = Lent::zeroed::<vg_options>("vg_options", fields);
     lent.put("context", 0, context as u64);

@@ -19,6 +19,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="worker threads; 0 means one per core")
     parser.add_argument("--version", action="version", version=__version__)
     chosen = parser.parse_args(arguments)
+    # Whatever else has such a name is no photograph, mask or camera of the scene.
+    if not chosen.asset.lower().endswith(".ply"):
+        parser.error(f"ASSET.ply: {chosen.asset}; expected a name that ends in .ply")
     views = chosen.views.split(",") if chosen.views else None
     try:
         scene = open_scene(chosen.scene, views, chosen.vehicle_from_world)

@@ -690,6 +690,7 @@ def reconstruct(
     budget: float | None,
     resolution: float,
     max_views: int | None,
+    max_gaussians: int | None,
     refine_iterations: int | None,
     refine_seconds: float | None,
     refine_hold_out: bool,

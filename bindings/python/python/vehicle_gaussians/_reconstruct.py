@@ -67,6 +67,7 @@ def reconstruct(
     budget: float | None = None,
     resolution: float = 1.0,
     max_views: int | None = None,
+    max_gaussians: int | None = 12_000_000,
     refine_iterations: int | None = None,
     refine_seconds: float | None = None,
     refine_hold_out: bool = False,
@@ -108,6 +109,8 @@ def reconstruct(
     resolution: the share of their width and height to which the views are resampled first, above 0, at most 1; a budget
     may choose less.
     max_views: use at most this many views, those that spread best around the vehicle; a budget may choose fewer.
+    max_gaussians: most Gaussians that the vehicle's pixels and their mirror images may be able to become; where they
+    could become more, the views are resampled to fewer pixels, and the report's left_out says so. None: any number.
     refine_iterations, refine_seconds: optimise the model against the photographs, by so many steps, or by as many as fit
     into about so many seconds; the report tells how many that were. Beside a budget, not within it.
     refine_hold_out: one of three or more views takes no part in that and tells when to stop.
@@ -146,6 +149,7 @@ def reconstruct(
         budget=budget,
         resolution=resolution,
         max_views=max_views,
+        max_gaussians=max_gaussians,
         refine_iterations=refine_iterations,
         refine_seconds=refine_seconds,
         refine_hold_out=refine_hold_out,

@@ -259,6 +259,7 @@ class vg_options(ct.Structure):
         ("has_vehicle_place", ct.c_int32),
         ("vehicle_flags", ct.c_uint32),
         ("progress_overall", ct.POINTER(ct.c_double)),
+        ("max_gaussians", ct.c_size_t),
     )
 
 
@@ -1485,6 +1486,7 @@ def reconstruct(
     budget: float | None = None,
     resolution: float = 1.0,
     max_views: int | None = None,
+    max_gaussians: int | None = 12_000_000,
     refine_iterations: int | None = None,
     refine_seconds: float | None = None,
     refine_hold_out: bool = False,
@@ -1517,6 +1519,10 @@ def reconstruct(
     if max_views is not None:
         # Of C, 0 is all.
         options.max_views = whole(max_views, "max_views", 1, sys.maxsize, "at least 1")
+    # Of C, 0 is any number.
+    options.max_gaussians = (
+        0 if max_gaussians is None else whole(max_gaussians, "max_gaussians", 1, sys.maxsize, "at least 1")
+    )
     if refine_iterations is not None:
         # Of C, 0 is none.
         options.refine_iterations = whole(refine_iterations, "refine_iterations", 1, _U32, "1 to 1000000")

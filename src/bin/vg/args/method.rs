@@ -5,7 +5,7 @@ use crate::job::{self, Failure, USAGE};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use vg::onnx::{Model, ModelOptions, Provider};
-use vg::pipeline::{Calibrate, Keep, Options, PriorChoice};
+use vg::pipeline::{Calibrate, DEFAULT_MAX_GAUSSIANS, Keep, Options, PriorChoice};
 use vg::refine::baseline::BaselineOptions;
 use vg::refine::{Amount, Densify, RefineOptions};
 use vg::relight::Relight;
@@ -69,6 +69,10 @@ pub(crate) struct MethodArgs {
     /// Use at most this many views, those that spread best around the vehicle
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     max_views: Option<usize>,
+    /// At most so many Gaussians may the vehicle's pixels and their mirror images be able to become; where they could
+    /// become more, the views are resampled to fewer pixels
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_MAX_GAUSSIANS, value_parser = at_least_one)]
+    max_gaussians: usize,
     /// Optimise the model against the photographs: so many steps (300), or as many as fit into so many seconds (5s)
     #[arg(long, value_name = "N|SECONDSs", value_parser = refinement)]
     refine: Option<Amount>,
@@ -95,7 +99,7 @@ pub(crate) struct MethodArgs {
 }
 
 /// Arguments of what a baseline has not.
-const NOT_OF_A_BASELINE: [&str; 15] = [
+const NOT_OF_A_BASELINE: [&str; 16] = [
     "prior",
     "prior_model",
     "head_model",
@@ -106,6 +110,7 @@ const NOT_OF_A_BASELINE: [&str; 15] = [
     "calibrate",
     "keep",
     "budget",
+    "max_gaussians",
     "refine_hold_out",
     "refine_densify",
     "refine_backend",
@@ -188,6 +193,7 @@ impl MethodArgs {
             budget_s: self.budget,
             resolution: self.resolution,
             max_views: self.max_views,
+            max_gaussians: Some(self.max_gaussians),
             threads: self.threads,
             points: false,
             refine: self.refine.filter(|_| self.baseline.is_none()).map(|amount| RefineOptions {
@@ -206,6 +212,11 @@ impl MethodArgs {
                 }
             }),
         }
+    }
+
+    /// The files that are read beside a scene.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        [&self.cloud, &self.prior_model, &self.head_model, &self.onnxruntime].into_iter().flatten()
     }
 
     /// Whether depth of the scene is read.

@@ -26,7 +26,8 @@ pub(crate) struct Cli {
 }
 
 const EXIT_CODES: &str = "Exit codes: 0 the job is done; 1 it failed (bad data, a file that cannot be read or \
-written); 2 the arguments make no sense; 130 interrupted.\nErrors are one line on standard error: vg: error: <cause>.";
+written); 2 the arguments make no sense; 130 interrupted, 143 terminated, 129 hung up.\nA result named - goes to \
+standard output, and nothing else does.\nErrors are one line on standard error: vg: error: <cause>.";
 
 #[derive(Subcommand)]
 pub(crate) enum Command {
@@ -127,6 +128,12 @@ pub(crate) struct ReconstructArgs {
     /// Write what was done: settings, stage times, counts, what was left out and why, errors
     #[arg(long, value_name = "R.json")]
     pub(crate) report: Option<PathBuf>,
+    /// For a process that another one started: the similarity itself, 16 numbers
+    #[arg(long, hide = true, conflicts_with = "vehicle_from_world")]
+    pub(crate) frame_matrix: Option<String>,
+    /// For such a process: end when standard input ends
+    #[arg(long, hide = true)]
+    pub(crate) end_with_input: bool,
 }
 
 #[derive(Args)]

@@ -70,6 +70,19 @@ impl Import {
         self.kind
     }
 
+    fn path(&self, scene: &str, key: &str) -> PathBuf {
+        PathBuf::from(self.pattern.replace("{scene}", scene).replace("{split}", key))
+    }
+
+    /// The files of a split's model, cameras beside it included.
+    pub(crate) fn files(&self, scene: &str, key: &str) -> Vec<PathBuf> {
+        let path = self.path(scene, key);
+        match std::fs::read_dir(&path) {
+            Ok(entries) => entries.flatten().map(|entry| entry.path()).collect(),
+            Err(_) => vec![path.with_extension("cameras.json"), path],
+        }
+    }
+
     /// The model of a split in the vehicle's frame.
     pub(crate) fn model(
         &self,
@@ -79,7 +92,7 @@ impl Import {
         scan: Option<&Cloud>,
         threads: &Threads,
     ) -> Result<Gaussians> {
-        let path = PathBuf::from(self.pattern.replace("{scene}", &vehicle.name).replace("{split}", key));
+        let path = self.path(&vehicle.name, key);
         if self.kind == Kind::Vehicle {
             return read(&path);
         }

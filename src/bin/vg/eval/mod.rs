@@ -11,13 +11,16 @@ pub(crate) mod table;
 mod tables;
 pub(crate) mod vehicles;
 
-use crate::args::{EvalArgs, TableName};
-use crate::files;
+use crate::args::{EvalArgs, JudgeArgs, TableName, VehiclesArgs};
+use crate::files::{self, Kind, Results};
+use crate::guard::Inputs;
 use crate::job::{Failure, Outcome, Result, USAGE};
 use contest::{Aligned, Broken, Contest, Row};
 use measure::Measured;
 use serde::Serialize;
+use std::path::PathBuf;
 use system::{Maker, Method, System, Takes};
+use vg::onnx::Model;
 use vg::pipeline::Options;
 
 /// What `--json` writes of one system.
@@ -47,9 +50,6 @@ struct Comparison<'a> {
 
 /// Every scene that can be evaluated is; the others are errors, and the exit code says that there were some.
 pub(crate) fn run(args: &EvalArgs) -> Result {
-    let outputs: Vec<_> = [&args.json, &args.markdown].into_iter().flatten().cloned().collect();
-    files::refuse_clashes(&outputs, &[])?;
-    outputs.iter().try_for_each(|path| files::prepare(path))?;
     if args.table.is_none() && args.systems.is_empty() && args.imports.is_empty() {
         return one(args);
     }
@@ -59,6 +59,36 @@ pub(crate) fn run(args: &EvalArgs) -> Result {
         return Err(Failure { message: message.into(), code: USAGE });
     }
     several(args)
+}
+
+fn results(args: &EvalArgs) -> Results {
+    Results::new([(Kind::Json, args.json.as_ref()), (Kind::Markdown, args.markdown.as_ref())])
+}
+
+/// What a measurement reads: scenes, what goes with each of them, and models.
+pub(crate) fn inputs(vehicles: &VehiclesArgs, judge: &JudgeArgs, systems: &[System]) -> Result<Inputs> {
+    let mut inputs = Inputs::default().files(&judge.lpips);
+    let methods = || {
+        systems.iter().filter_map(|system| match &system.maker {
+            Maker::Method(method) => Some(method),
+            _ => None,
+        })
+    };
+    for method in methods() {
+        let models = [&method.settings.prior_model, &method.settings.head_model].into_iter().flatten();
+        inputs = inputs.files(models.map(Model::path));
+    }
+    for scene in vehicles::found(&vehicles.scenes)? {
+        let scan = vehicles.align.as_ref().and_then(|named| named.as_ref());
+        let beside =
+            [Some(&vehicles.split), vehicles.frame.vehicle_from_world.as_ref(), scan, judge.scan.as_ref()];
+        let named = beside.into_iter().flatten().chain(methods().filter_map(|method| method.cloud.as_ref()));
+        let found: Vec<PathBuf> = named.map(|file| split::find(file, &scene)).collect();
+        let imported: Vec<PathBuf> =
+            systems.iter().flat_map(|system| system.imported(vehicles, &scene)).collect();
+        inputs = inputs.files(&found).files(&imported).scene(&scene);
+    }
+    Ok(inputs)
 }
 
 /// A table of one system, a row for each split.
@@ -77,6 +107,8 @@ fn one(args: &EvalArgs) -> Result {
     let settings = method.settings.clone();
     let system =
         System { name: "this".into(), maker: Maker::Method(Box::new(method)), takes: Takes::default() };
+    let results = results(args);
+    results.prepare(&inputs(&args.vehicles, &args.judge, std::slice::from_ref(&system))?)?;
     let contest = contest::hold(
         &args.vehicles,
         &args.judge,
@@ -89,7 +121,7 @@ fn one(args: &EvalArgs) -> Result {
     let mean = row.mean.as_ref().filter(|_| row.each.len() > 1).map(|mean| ("mean", "", mean));
     let grid = table::of_splits(each.chain(mean));
     if let Some(path) = &args.markdown {
-        files::write(path, grid.markdown().as_bytes())?;
+        files::write(path, |out| out.write_all(grid.markdown().as_bytes()))?;
     }
     if let Some(path) = &args.json {
         let document = Document {
@@ -103,12 +135,15 @@ fn one(args: &EvalArgs) -> Result {
         };
         files::write_json(path, &document)?;
     }
-    Ok(Outcome { text: grid.text(), complete: contest.is_complete(std::slice::from_ref(&system)) })
+    let complete = contest.is_complete(std::slice::from_ref(&system));
+    Ok(results.outcome(Outcome { text: grid.text(), complete }))
 }
 
 /// A table of several, a row for each.
 fn several(args: &EvalArgs) -> Result {
     let systems = tables::systems(args)?;
+    let results = results(args);
+    results.prepare(&inputs(&args.vehicles, &args.judge, &systems)?)?;
     let model_options = args.method.model_options();
     let contest = contest::hold(&args.vehicles, &args.judge, &model_options, &systems, args.repeat)?;
     let Contest { rows, errors, aligned, lpips_net } = &contest;
@@ -117,7 +152,7 @@ fn several(args: &EvalArgs) -> Result {
     if let Some(path) = &args.markdown {
         let lines: String = missing.lines().map(|line| format!("- {line}\n")).collect();
         let text = if lines.is_empty() { grid.markdown() } else { format!("{}\n{lines}", grid.markdown()) };
-        files::write(path, text.as_bytes())?;
+        files::write(path, |out| out.write_all(text.as_bytes()))?;
     }
     if let Some(path) = &args.json {
         let document = Comparison {
@@ -133,5 +168,5 @@ fn several(args: &EvalArgs) -> Result {
         files::write_json(path, &document)?;
     }
     let text = [grid.text(), missing].into_iter().filter(|t| !t.is_empty()).collect::<Vec<_>>().join("\n");
-    Ok(Outcome { text, complete: contest.is_complete(&systems) })
+    Ok(results.outcome(Outcome { text, complete: contest.is_complete(&systems) }))
 }

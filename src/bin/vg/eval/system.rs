@@ -1,11 +1,13 @@
 //! What is compared: systems, each a row of a table or a point of a sweep.
 
 use super::import::Import;
-use crate::args::{DepthArgs, MethodArgs};
+use super::split;
+use crate::args::{DepthArgs, MethodArgs, VehiclesArgs};
 use crate::job::{Failure, Result, USAGE};
+use crate::scene;
 use clap::Parser;
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use vg::pipeline::Options;
 
 /// A row: what makes the models, and in which splits.
@@ -77,6 +79,15 @@ impl System {
         let method = Method::of(words.map(Into::into), &format!("{argument} \"{text}\""))?;
         let name = if name.is_empty() { "default" } else { name }.to_owned();
         Ok(Self { name, maker: Maker::Method(Box::new(method)), takes: Takes::default() })
+    }
+
+    /// The files that another program made of a scene, one for each split.
+    pub(crate) fn imported(&self, vehicles: &VehiclesArgs, scene: &Path) -> Vec<PathBuf> {
+        let Maker::Import(import) = &self.maker else { return Vec::new() };
+        // What is wrong with the split is told where it is measured.
+        let splits = split::read(&split::find(&vehicles.split, scene), vehicles.only.as_deref());
+        let keys = splits.into_iter().flatten().map(|(key, _)| key);
+        keys.flat_map(|key| import.files(&scene::name(scene), &key)).collect()
     }
 }
 

@@ -3,6 +3,7 @@
 use super::contest::Row;
 use super::measure::Measured;
 use crate::grid::{Column, Grid, number};
+use crate::shown;
 use Column::{Numbers, Rare, Words};
 
 /// A row for each split, and their mean.
@@ -135,8 +136,8 @@ fn surface(m: &Measured) -> [String; 5] {
 
 /// Why rows have no numbers, a line each.
 pub(crate) fn missing(rows: &[Row]) -> String {
-    let lines = rows.iter().flat_map(|row| {
-        row.missing.iter().map(|why| format!("{}: {}", row.system, why.replace(['\n', '\r'], " ")))
-    });
+    let lines = rows
+        .iter()
+        .flat_map(|row| row.missing.iter().map(|why| shown::line(&format!("{}: {why}", row.system))));
     lines.collect::<Vec<_>>().join("\n")
 }

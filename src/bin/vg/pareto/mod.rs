@@ -6,7 +6,8 @@ mod plot;
 use crate::args::ParetoArgs;
 use crate::eval::contest::{self, Contest, Row};
 use crate::eval::system::System;
-use crate::eval::table;
+use crate::eval::{self, table};
+use crate::files::{Kind, Results};
 use crate::grid::{Column, Grid, number};
 use crate::job::{Outcome, Result};
 use crate::{files, raster};
@@ -33,12 +34,15 @@ struct Document<'a> {
 
 /// A scene or a point that cannot be measured is an error, and the others go on without it.
 pub(crate) fn run(args: &ParetoArgs) -> Result {
-    let outputs: Vec<_> =
-        [&args.csv, &args.svg, &args.png, &args.json].into_iter().flatten().cloned().collect();
-    files::refuse_clashes(&outputs, &[])?;
-    outputs.iter().try_for_each(|path| files::prepare(path))?;
     let points = args.points.iter().map(|text| System::read("--point", text, &args.with));
     let systems: Vec<System> = points.collect::<Result<_>>()?;
+    let results = Results::new([
+        (Kind::Csv, args.csv.as_ref()),
+        (Kind::Svg, args.svg.as_ref()),
+        (Kind::Png, args.png.as_ref()),
+        (Kind::Json, args.json.as_ref()),
+    ]);
+    results.prepare(&eval::inputs(&args.vehicles, &args.judge, &systems)?)?;
     let contest =
         contest::hold(&args.vehicles, &args.judge, &ModelOptions::default(), &systems, args.repeat)?;
     let complete = contest.is_complete(&systems);
@@ -47,14 +51,15 @@ pub(crate) fn run(args: &ParetoArgs) -> Result {
     let points = on_front(rows);
     let grid = grid(&points);
     if let Some(path) = &args.csv {
-        files::write(path, grid.csv().as_bytes())?;
+        files::write(path, |out| out.write_all(grid.csv().as_bytes()))?;
     }
     let drawn = plot::svg(&points, &args.title);
     if let Some((path, drawn)) = args.svg.as_ref().zip(drawn.as_ref()) {
-        files::write(path, drawn.as_bytes())?;
+        files::write(path, |out| out.write_all(drawn.as_bytes()))?;
     }
     if let Some((path, drawn)) = args.png.as_ref().zip(drawn.as_ref()) {
-        files::write(path, &raster::png(drawn)?)?;
+        let png = raster::png(drawn)?;
+        files::write(path, |out| out.write_all(&png))?;
     }
     if let Some(path) = &args.json {
         let version = env!("CARGO_PKG_VERSION");
@@ -62,7 +67,7 @@ pub(crate) fn run(args: &ParetoArgs) -> Result {
         files::write_json(path, &document)?;
     }
     let text = [grid.text(), missing].into_iter().filter(|t| !t.is_empty()).collect::<Vec<_>>().join("\n");
-    Ok(Outcome { text, complete })
+    Ok(results.outcome(Outcome { text, complete }))
 }
 
 /// Seconds and PSNR of a row that has both.

@@ -1,6 +1,7 @@
 //! The sweep as a picture: error against run time, SVG.
 
 use super::{Point, labels, place};
+use crate::shown;
 use std::fmt::Write;
 
 const SIZE: [f64; 2] = [860.0, 520.0];
@@ -164,14 +165,14 @@ fn grid(out: &mut String, x: &Axis, y: &Axis) {
     );
 }
 
-/// For XML; what a terminal would take for a command is left out.
+/// For XML; control characters are escaped.
 fn escaped(text: &str) -> String {
     let one = |c: char| match c {
         '&' => "&amp;".into(),
         '<' => "&lt;".into(),
         '>' => "&gt;".into(),
-        c if c.is_control() => String::new(),
-        c => c.to_string(),
+        c if shown::is_plain(c) => c.to_string(),
+        c => c.escape_default().to_string(),
     };
     text.chars().map(one).collect()
 }
@@ -192,6 +193,6 @@ mod tests {
 
     #[test]
     fn names_cannot_break_the_picture() {
-        assert_eq!(escaped("a<b>&\u{1b}\n"), "a&lt;b&gt;&amp;");
+        assert_eq!(escaped("a<b>&\u{1b}\n"), "a&lt;b&gt;&amp;\\u{1b}\\n");
     }
 }

@@ -10,6 +10,8 @@ mod text;
 
 use crate::args::ReportArgs;
 use crate::eval::split;
+use crate::files::{Kind, Results};
+use crate::guard::Inputs;
 use crate::job::{self, Failure, Outcome, Result};
 use crate::{cloud, files, reconstruct, scene, shown};
 use compare::{Compared, Role};
@@ -30,16 +32,11 @@ pub(crate) fn run(args: &ReportArgs) -> Result {
     };
     let cloud_file = args.method.cloud.as_deref().map(|file| split::find(file, &args.scene));
     let method = &args.method;
-    let more = [&cloud_file, &method.prior_model, &method.head_model, &chosen.file];
-    let frame = args.frame.vehicle_from_world.iter();
-    let read: Vec<PathBuf> = [Some(&inputs), tests.as_ref()]
-        .into_iter()
-        .flatten()
-        .flat_map(scene::files_of)
-        .chain(more.into_iter().flatten().chain(frame).cloned())
-        .collect();
-    files::refuse_clashes(std::slice::from_ref(&args.output), &read)?;
-    files::prepare(&args.output)?;
+    let results = Results::new([(Kind::Html, Some(&args.output))]);
+    let listed: Vec<PathBuf> =
+        [Some(&inputs), tests.as_ref()].into_iter().flatten().flat_map(scene::files_of).collect();
+    let read = Inputs::default().files(&listed).files(method.files()).files(&cloud_file).files(&chosen.file);
+    results.prepare(&read.files(&args.frame.vehicle_from_world).scene(&args.scene))?;
 
     let threads = Threads::new(method.threads)?;
     let mut opened = scene::load(inputs, &threads)?.scene;
@@ -68,8 +65,8 @@ pub(crate) fn run(args: &ReportArgs) -> Result {
         warnings: &job::noted(),
         command: text::command(std::env::args_os().skip(1)),
     });
-    files::write(&args.output, page.as_bytes())?;
-    Ok(Outcome::done(summary(&args.output, page.len(), &inputs, &tests)))
+    files::write(&args.output, |out| out.write_all(page.as_bytes()))?;
+    Ok(results.outcome(Outcome::done(summary(&args.output, page.len(), &inputs, &tests))))
 }
 
 /// Which views the method sees, and in which it is judged.
@@ -131,5 +128,5 @@ fn summary(output: &Path, bytes: usize, inputs: &[Compared], tests: &[Compared])
             mean.silhouette_iou
         )
     });
-    format!("{}: {} kB{errors}", output.display(), shown::count(bytes.div_ceil(1000)))
+    format!("{}: {} kB{errors}", shown::path(output), shown::count(bytes.div_ceil(1000)))
 }

@@ -1,8 +1,9 @@
 //! Text for the page: escaped names, numbers as people read them, and a command as a shell takes it.
 
+use crate::shown;
 use std::ffi::OsString;
 
-/// For HTML, inside elements and inside quoted attributes. What a terminal would take for a command is shown as unknown.
+/// For HTML, inside elements and inside quoted attributes. Control characters are escaped.
 pub(super) fn escaped(text: &str) -> String {
     let one = |c: char| match c {
         '&' => "&amp;".into(),
@@ -11,8 +12,8 @@ pub(super) fn escaped(text: &str) -> String {
         '"' => "&quot;".into(),
         '\'' => "&#39;".into(),
         '\n' => "\n".into(),
-        c if c.is_control() => "\u{fffd}".into(),
-        c => c.to_string(),
+        c if shown::is_plain(c) => c.to_string(),
+        c => c.escape_default().to_string(),
     };
     text.chars().map(one).collect()
 }
@@ -71,7 +72,7 @@ mod tests {
     #[test]
     fn names_cannot_break_the_page() {
         let found = escaped("<script>\"a\" & 'b'\u{1b}");
-        assert_eq!(found, "&lt;script&gt;&quot;a&quot; &amp; &#39;b&#39;\u{fffd}");
+        assert_eq!(found, "&lt;script&gt;&quot;a&quot; &amp; &#39;b&#39;\\u{1b}");
     }
 
     #[test]

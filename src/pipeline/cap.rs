@@ -1,0 +1,103 @@
+//! A cap on the size of the model, kept before the work is done: every vehicle pixel can become a Gaussian, and each of
+//! those a mirror image. Where these are more than [`Options::max_gaussians`], the views are resampled.
+
+use super::options::Options;
+use super::plan;
+use super::report::LeftOut;
+use super::run::undistorted;
+use crate::error::{Error, Result};
+use crate::progress::Context;
+use crate::scene::{Mask, Scene, View};
+use crate::symmetry::SymmetryMode;
+
+/// The default. A PLY file of so many, 164 bytes each at SH degree 2, has 2 GB. Four photographs of 1920 x 1080 pixels
+/// can become 10 million where 60 % of each show the vehicle, and are below.
+pub const DEFAULT_MAX_GAUSSIANS: usize = 12_000_000;
+
+/// The resolution is lowered in such steps, so that it can be told and asked for.
+const STEPS: f64 = 1000.0;
+
+/// Least that another try lowers the resolution by; lenses and rounded sides make pixels that were not foreseen.
+const LOWER: f64 = 0.98;
+
+/// The views to work with, at the resolution asked for or at a lower one that keeps the cap.
+pub(super) fn fitted(
+    scene: &Scene,
+    used: &[usize],
+    options: &Options,
+    left_out: &mut Vec<LeftOut>,
+    context: &Context,
+) -> Result<Vec<View>> {
+    let asked = options.resolution;
+    let at = |resolution: f64, notes: &mut Vec<LeftOut>| undistorted(scene, used, resolution, notes, context);
+    let Some(cap) = options.max_gaussians else { return at(asked, left_out) };
+    let given = used.iter().map(|&i| &scene.views[i]);
+    let most = (most_gaussians(given, options.symmetry) as f64 * asked * asked) as usize;
+    let mut resolution = if most > cap { lowered(asked, cap, most) } else { asked };
+    loop {
+        let too_few = || {
+            let found = format!("{cap}, where vehicle pixels and their mirror images could become {most}");
+            Error::argument("options.max_gaussians", found, "enough that some pixel shows the vehicle")
+        };
+        if resolution <= 0.0 {
+            return Err(too_few());
+        }
+        let mut notes = Vec::new();
+        let views = at(resolution, &mut notes).map_err(|e| match e {
+            Error::Argument { .. } if resolution < asked => too_few(),
+            other => other,
+        })?;
+        let now = most_gaussians(&views, options.symmetry);
+        if now > cap {
+            resolution = lowered(resolution, cap, now).min(in_steps(LOWER * resolution));
+            continue;
+        }
+        left_out.append(&mut notes);
+        if resolution < asked {
+            let why = format!(
+                "vehicle pixels and their mirror images could become {most}, more than max_gaussians, {cap}: the \
+                 views are resampled to {resolution} of their width and height"
+            );
+            plan::note(left_out, GAUSSIANS, &why, most.saturating_sub(cap).max(1));
+        }
+        return Ok(views);
+    }
+}
+
+/// What the cap leaves out, as the report calls it.
+pub const GAUSSIANS: &str = "Gaussians";
+
+/// The most Gaussians that the views can become.
+fn most_gaussians<'a>(views: impl IntoIterator<Item = &'a View>, symmetry: SymmetryMode) -> usize {
+    let all = |view: &View| view.camera.width as usize * view.camera.height as usize;
+    let vehicle = |view: &View| view.mask.as_ref().map_or_else(|| all(view), Mask::vehicle_pixels);
+    let pixels: usize = views.into_iter().map(vehicle).sum();
+    match symmetry {
+        SymmetryMode::Never => pixels,
+        SymmetryMode::Auto | SymmetryMode::Always | SymmetryMode::Flip => 2 * pixels,
+    }
+}
+
+/// The resolution at which `cap` of what are now `most` are left.
+fn lowered(resolution: f64, cap: usize, most: usize) -> f64 {
+    in_steps(resolution * (cap as f64 / most as f64).sqrt())
+}
+
+fn in_steps(resolution: f64) -> f64 {
+    (resolution * STEPS).floor() / STEPS
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_resolution_is_lowered_in_steps_and_never_above_the_cap() {
+        assert_eq!(lowered(1.0, 12_000_000, 48_000_000), 0.5);
+        assert_eq!(lowered(0.5, 1, 3), 0.288);
+        for (cap, most) in [(1, 2), (5, 7), (999, 1000), (1_000_000, 38_000_000)] {
+            let share = lowered(1.0, cap, most);
+            assert!(share * share * most as f64 <= cap as f64, "{cap} of {most}: {share}");
+        }
+    }
+}
