@@ -114,3 +114,24 @@ fn a_model_without_a_gauge_is_refused_and_with_one_is_scaled_turned_and_moved() 
         assert_eq!((points.len(), colors.len()), (6, 6));
     }
 }
+
+#[test]
+fn names_with_spaces_lose_no_image_with_or_without_their_features() {
+    use vg::io::colmap::images_from_text;
+    let record = |id: u32, name: &str| format!("{id} 1 0 0 0 0 0 {id}.5 1 {name}\n");
+    let names = ["two  spaces here.png", "a b c.png", "plain.png"];
+    let path = Path::new("images.txt");
+    for features in ["\n", "1.5 2.5 -1 3 4 18446744073709551615\n"] {
+        let text: String =
+            names.iter().enumerate().map(|(i, name)| record(i as u32 + 1, name) + features).collect();
+        // The last image's line of features may be missing with its end.
+        for text in [text.clone(), text.strip_suffix(features).unwrap().to_owned()] {
+            let found = images_from_text(text.as_bytes(), path).unwrap();
+            assert_eq!(found.iter().map(|i| i.name.to_str().unwrap()).collect::<Vec<_>>(), names);
+        }
+    }
+    // Twelve words in a line are no four features when they are the next image.
+    let squeezed: String = names.iter().enumerate().map(|(i, name)| record(i as u32 + 1, name)).collect();
+    let error = images_from_text(squeezed.as_bytes(), path).unwrap_err().to_string();
+    assert!(error.contains("images.txt: line 2: not POINTS2D"), "{error}");
+}

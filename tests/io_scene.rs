@@ -173,13 +173,241 @@ fn alpha_is_the_mask_where_there_is_no_other_and_full_alpha_says_nothing() {
 }
 
 #[test]
-fn a_mask_of_zeros_and_ones_is_empty_and_noted() {
+fn a_mask_of_zeros_and_ones_is_read_and_one_of_classes_is_an_error_that_tells_the_rule() {
     let small = Small::new(r#""mask_path": "m.png","#);
-    let gray = [[0u8; 3], [1; 3], [1; 3], [0; 3], [0; 3], [0; 3], [0; 3], [0; 3]];
-    write_rgb8(&small.path("m.png"), 4, 2, &gray).unwrap();
-    let opened = small.open().unwrap();
-    assert_eq!(opened.scene.views[0].mask.as_ref().unwrap().vehicle_pixels(), 0);
-    assert!(opened.notes[0].contains("m.png: the largest value is 1"), "{:?}", opened.notes);
+    let grey = |values: [u8; 8]| write_rgb8(&small.path("m.png"), 4, 2, &values.map(|v| [v; 3])).unwrap();
+    grey([0, 1, 1, 0, 0, 0, 0, 0]);
+    assert_eq!((small.vehicle_pixels(), small.open().unwrap().notes), (Some(2), vec![]));
+    grey([0, 1, 2, 0, 0, 0, 0, 0]);
+    let error = small.open().unwrap_err().to_string();
+    assert!(error.contains("m.png: mask: largest value 2") && error.contains("128 and above"), "{error}");
+}
+
+#[test]
+fn masks_are_found_by_every_name_in_use() {
+    let names = [
+        "masks/a.png",
+        "masks/a.png.png",
+        "masks/a_mask.png",
+        "masks/a.mask.png",
+        "mask/a.PNG",
+        "Masks/A.png",
+        "mask/images/a.png",
+    ];
+    for name in names {
+        let small = Small::new("");
+        small.mask(name, 4);
+        assert_eq!(small.vehicle_pixels(), Some(1), "{name}");
+        assert_eq!(small.open().unwrap().notes, Vec::<String>::new());
+    }
+    let small = Small::new("");
+    fs::create_dir(small.path("mask")).unwrap();
+    // Grey blocks of 8 pixels survive JPEG.
+    let half = image::GrayImage::from_fn(4, 2, |_, v| image::Luma([if v == 0 { 255 } else { 0 }]));
+    half.save(small.path("mask/a.jpg")).unwrap();
+    assert!(small.open().unwrap().scene.views[0].mask.is_some());
+    // In a folder that all pictures share, masks need not repeat it; with several folders they must.
+    let frames = |paths: [&str; 2]| {
+        let frame = |p| format!(r#"{{"file_path": "{p}", "transform_matrix": {POSE}}}"#);
+        format!(r#"{{"fl_x": 4, "frames": [{}]}}"#, paths.map(frame).join(","))
+    };
+    for (paths, mask, masked) in [
+        (["rgb/a.png", "rgb/b.png"], "masks/b.png", [false, true]),
+        (["cam0/a.png", "cam1/a.png"], "masks/a.png", [false, false]),
+        (["cam0/a.png", "cam1/a.png"], "masks/cam1/a.png", [false, true]),
+    ] {
+        let small = Small::new("");
+        small.transforms(&frames(paths));
+        for path in paths {
+            fs::create_dir_all(small.path(path).parent().unwrap()).unwrap();
+            write_rgb8(&small.path(path), 4, 2, &[[9; 3]; 8]).unwrap();
+        }
+        small.mask(mask, 4);
+        let found: Vec<bool> = small.open().unwrap().scene.views.iter().map(|v| v.mask.is_some()).collect();
+        assert_eq!(found, masked, "{mask}");
+    }
+}
+
+#[test]
+fn what_is_missing_is_told_once_with_every_name_that_was_tried() {
+    let small = Small::new("");
+    assert_eq!(
+        small.open().unwrap().notes,
+        [
+            "no view has a mask: looked for masks/{a,a.png,a_mask,a.mask}.{png,jpg,jpeg,npy}, and the same in mask/"
+        ]
+    );
+    let frame = |name: &str| format!(r#"{{"file_path": "images/{name}.png", "transform_matrix": {POSE}}}"#);
+    let frames = ["a", "b", "c"].map(frame).join(",");
+    small.transforms(&format!(r#"{{"fl_x": 4, "frames": [{frames}]}}"#));
+    for name in ["b", "c"] {
+        write_rgb8(&small.path(&format!("images/{name}.png")), 4, 2, &[[9; 3]; 8]).unwrap();
+    }
+    small.mask("masks/b.png", 4);
+    let notes = small.open().unwrap().notes;
+    assert_eq!(notes.len(), 1, "{notes:?}");
+    assert!(notes[0].starts_with("a.png, c.png: no mask, though other views have one: looked for masks/{a,"));
+    small.transforms(&format!(
+        r#"{{"fl_x": 4, "w": 4, "h": 2, "frames": [{{"file_path": "images/x.v1", "transform_matrix": {POSE}}}]}}"#
+    ));
+    let error = small.open().unwrap_err().to_string();
+    assert!(
+        error.ends_with("images/x.v1: picture: no such file, nor one with .png, .jpg, .jpeg added"),
+        "{error}"
+    );
+}
+
+#[test]
+fn pictures_are_found_without_their_extension_in_other_cases_and_with_backslashes() {
+    for (written, file) in [
+        ("images/b", "images/b.jpg"),
+        ("images/b", "images/b.JPEG"),
+        ("images/b.v2", "images/b.v2.png"),
+        ("images/b.jpg", "images/B.JPG"),
+        (r"images\\sub\\b.png", "images/sub/b.png"),
+    ] {
+        let small = Small::new("");
+        small.transforms(&format!(
+            r#"{{"fl_x": 4, "frames": [{{"file_path": "{written}", "transform_matrix": {POSE}}}]}}"#
+        ));
+        image::RgbImage::new(4, 2).save(small.path(file)).unwrap();
+        small.mask(
+            &format!("masks/{}.png", file.strip_prefix("images/").unwrap().rsplit_once('.').unwrap().0),
+            4,
+        );
+        let opened = small.open().unwrap_or_else(|e| panic!("{written}: {e}"));
+        assert_eq!(opened.index.views[0].image, small.path(file));
+        assert_eq!(small.vehicle_pixels(), Some(1), "{written}");
+    }
+    let small = Small::new("");
+    small.transforms(&format!(
+        r#"{{"fl_x": 4, "frames": [{{"file_path": "..\\..\\a.png", "transform_matrix": {POSE}}}]}}"#
+    ));
+    assert!(small.open().unwrap_err().to_string().contains("leads out of the scene's folder"));
+}
+
+/// A NumPy array of two rows of four numbers of this type.
+fn npy(descr: &str, data: &[u8]) -> Vec<u8> {
+    let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (2, 4), }}");
+    [b"\x93NUMPY\x01\0", &(header.len() as u16).to_le_bytes()[..], header.as_bytes(), data].concat()
+}
+
+#[test]
+fn depth_beside_a_transforms_json_that_lists_none_is_found_in_its_own_unit() {
+    let floats: Vec<u8> = [2.5f32; 8].iter().flat_map(|v| v.to_le_bytes()).collect();
+    let integers: Vec<u8> = [2500u16; 8].iter().flat_map(|v| v.to_le_bytes()).collect();
+    let cases = [
+        ("depth/a.npy", npy("<f4", &floats)),
+        ("depth/a.npy", npy("<u2", &integers)),
+        ("Depths/a_depth.NPY", npy("<f4", &floats)),
+    ];
+    for (name, bytes) in &cases {
+        let small = Small::new("");
+        fs::create_dir(small.path(name).parent().unwrap()).unwrap();
+        fs::write(small.path(name), bytes).unwrap();
+        let depth = small.open().unwrap().scene.views[0].depth.clone().unwrap();
+        assert_eq!(depth.depth(), [2.5; 8], "{name}");
+    }
+    // Listed, it is read alike; another unit is the scene's or the caller's to say.
+    let small = Small::new(r#""depth_file_path": "d.npy","#);
+    fs::write(small.path("d.npy"), &cases[0].1).unwrap();
+    assert_eq!(small.open().unwrap().scene.views[0].depth.as_ref().unwrap().depth(), [2.5; 8]);
+    let options = SceneOptions { depth_scale: Some(2.0), ..SceneOptions::default() };
+    let opened = open_scene(small.dir.path(), &options).unwrap();
+    assert_eq!(opened.scene.views[0].depth.as_ref().unwrap().depth(), [5.0; 8]);
+    // A file that lists depth for one frame has none for the others.
+    let frames = [r#""depth_file_path": "d.npy","#, ""];
+    let frame =
+        |(i, keys)| format!(r#"{{"file_path": "images/{i}.png", {keys} "transform_matrix": {POSE}}}"#);
+    let frames = frames.into_iter().enumerate().map(frame).collect::<Vec<_>>().join(",");
+    small.transforms(&format!(r#"{{"fl_x": 4, "frames": [{frames}]}}"#));
+    fs::create_dir(small.path("depth")).unwrap();
+    for i in 0..2 {
+        write_rgb8(&small.path(&format!("images/{i}.png")), 4, 2, &[[9; 3]; 8]).unwrap();
+        fs::write(small.path(&format!("depth/{i}.npy")), &cases[0].1).unwrap();
+    }
+    let views = small.open().unwrap().scene.views;
+    assert!(views[0].depth.is_some() && views[1].depth.is_none());
+}
+
+#[test]
+fn the_largest_of_several_colmap_models_is_taken_and_said() {
+    let dir = tempfile::tempdir().unwrap();
+    for (model, images) in
+        [("0", "1 1 0 0 0 0 0 0 1 a.png\n\n"), ("1", ""), ("10", "1 1 0 0 0 0 0 0 1 a.png\n\n")]
+    {
+        let folder = dir.path().join("sparse").join(model);
+        fs::create_dir_all(&folder).unwrap();
+        fs::write(folder.join("cameras.txt"), "1 PINHOLE 4 2 4 4 2 1\n").unwrap();
+        let two = "1 1 0 0 0 0 0 0 1 a.png\n\n2 1 0 0 0 0 0 1 1 b.png\n";
+        fs::write(folder.join("images.txt"), if model == "1" { two } else { images }).unwrap();
+    }
+    let index = list_scene(dir.path(), &sedan_colmap()).unwrap();
+    assert_eq!(index.source, dir.path().join("sparse/1"));
+    assert_eq!(index.views.len(), 2);
+    let note = &index.notes[0];
+    assert!(note.contains("sparse/1: taken of 3 COLMAP models, with 2 images"), "{note}");
+    assert!(note.contains("sparse/0 has 1") && note.contains("sparse/10 has 1"), "{note}");
+    // The one that is named is the one that is read.
+    let named = list_scene(&dir.path().join("sparse/10"), &sedan_colmap()).unwrap();
+    assert_eq!((named.views.len(), named.notes.len()), (1, 0));
+}
+
+#[test]
+fn a_turned_picture_is_refused_where_its_camera_may_be_of_either_pixels() {
+    // EXIF orientation 3: turned by 180 degrees.
+    let exif = b"Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x03\0\0\0\0\0\0\0";
+    let mut jpeg = std::io::Cursor::new(Vec::new());
+    image::RgbImage::new(4, 2).write_to(&mut jpeg, image::ImageFormat::Jpeg).unwrap();
+    let jpeg = jpeg.into_inner();
+    let turned = [&jpeg[..2], &[0xff, 0xe1, 0, exif.len() as u8 + 2], exif, &jpeg[2..]].concat();
+    for size in ["", r#""w": 4, "h": 2,"#] {
+        let small = Small::new(size);
+        fs::write(small.path("images/a.png"), &turned).unwrap();
+        let error = small.open().unwrap_err().to_string();
+        assert!(error.contains("images/a.png: EXIF orientation: 3") && error.contains("exiftool"), "{error}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_and_devices_are_refused_and_not_waited_for() {
+    let pipe = |path: &Path| {
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        let _ = fs::remove_file(path);
+        let made = std::process::Command::new("mkfifo").arg(path).status().unwrap();
+        assert!(made.success());
+    };
+    for name in ["images/a.png", "masks/a.png", "depth/a.png", "transforms.json"] {
+        let small = Small::new("");
+        pipe(&small.path(name));
+        let error = small.open().unwrap_err().to_string();
+        assert!(
+            error.ends_with(&format!(
+                "{name}: file: is a pipe, a socket or a device; allowed: a regular file"
+            )),
+            "{error}"
+        );
+    }
+    let small = Small::new(r#""mask_path": "m.png","#);
+    std::os::unix::fs::symlink("/dev/zero", small.path("m.png")).unwrap();
+    assert!(small.open().unwrap_err().to_string().contains("m.png: file: is a pipe, a socket or a device"));
+}
+
+#[test]
+fn a_picture_of_the_wrong_size_is_refused_by_its_header_alone() {
+    let small = Small::new(r#""w": 8, "h": 4, "mask_path": "m.png", "depth_file_path": "d.png","#);
+    // A header of 4x2 and no pixel behind it: decoding it would be another error.
+    let whole = fs::read(small.path("images/a.png")).unwrap();
+    for name in ["images/a.png", "m.png", "d.png"] {
+        write_rgb8(&small.path("images/a.png"), 8, 4, &[[9; 3]; 32]).unwrap();
+        write_rgb8(&small.path("m.png"), 8, 4, &[[0; 3]; 32]).unwrap();
+        write_depth16(&small.path("d.png"), 8, 4, &[2.0; 32]).unwrap();
+        small.open().unwrap();
+        fs::write(small.path(name), &whole[..whole.len() - 20]).unwrap();
+        let error = small.open().unwrap_err().to_string();
+        assert!(error.contains(&format!("{name}: size: 4x2, but its")), "{error}");
+    }
 }
 
 #[test]

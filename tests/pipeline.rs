@@ -427,6 +427,70 @@ fn a_floating_pixel_between_two_surfaces_is_left_out() {
     assert_eq!(left_out(&made, "floating"), 1);
 }
 
+/// Length, width, height.
+fn extent(made: &Reconstruction) -> [f32; 3] {
+    let (low, high) = made.gaussians.bounds().unwrap();
+    std::array::from_fn(|k| high[k] - low[k])
+}
+
+/// The scene with each view's depth changed, `change(depths, column, row)`.
+fn with_depth(
+    scene: &Scene,
+    views: usize,
+    change: impl Fn(&dyn Fn(i32, i32) -> f32, i32, i32) -> f32,
+) -> Scene {
+    let mut scene = scene.clone();
+    for view in &mut scene.views[..views] {
+        let depth = view.depth.take().unwrap();
+        let (w, h) = (depth.width() as i32, depth.height() as i32);
+        let at = |u: i32, v: i32| depth.depth()[(v.clamp(0, h - 1) * w + u.clamp(0, w - 1)) as usize];
+        let changed = (0..w * h).map(|i| change(&at, i % w, i / w)).collect();
+        view.depth = Some(DepthMap::new(depth.width(), depth.height(), changed).unwrap());
+    }
+    scene
+}
+
+#[test]
+fn depth_that_a_resize_mixed_at_its_edges_makes_no_larger_vehicle() {
+    let clean = right_side(160, 120);
+    let expected = extent(&run(&clean, &Options::default()));
+    // Means of three by three pixels, with nothing taken for 0, and with a wall behind.
+    for behind in [0.0, 25.0] {
+        let blurred = with_depth(&clean, 4, |at, u, v| {
+            let around = (-1..=1).flat_map(|dv| (-1..=1).map(move |du| (du, dv)));
+            around.map(|(du, dv)| at(u + du, v + dv)).map(|z| if z > 0.0 { z } else { behind }).sum::<f32>()
+                / 9.0
+        });
+        let made = run(&blurred, &Options::default());
+        assert!(left_out(&made, "floating") > 300, "{:?}", made.report.left_out);
+        let kept = Options { keep: Keep { floaters: true, ..Keep::default() }, ..Options::default() };
+        let (found, unguarded) = (extent(&made), extent(&run(&blurred, &kept)));
+        for k in 0..3 {
+            assert!((found[k] - expected[k]).abs() < 0.3, "{behind}: {found:?} for {expected:?}");
+        }
+        assert!((0..3).any(|k| unguarded[k] > expected[k] + 1.0), "{behind}: {unguarded:?}");
+    }
+}
+
+#[test]
+fn a_few_stray_pixels_and_depth_outside_the_other_masks_make_no_larger_vehicle() {
+    let clean = right_side(160, 120);
+    let expected = extent(&run(&clean, &Options::default()));
+    for (side, why) in [(1, "floating"), (2, "hangs together with nothing"), (20, "most other views' masks")]
+    {
+        let inside = move |u: i32, v: i32| (80..80 + side).contains(&u) && (60..60 + side).contains(&v);
+        let stray = with_depth(&clean, 1, |at, u, v| if inside(u, v) { 12.0 } else { at(u, v) });
+        let made = run(&stray, &Options::default());
+        assert!(
+            left_out(&made, why) >= (side * side * 3 / 4).max(1) as usize,
+            "{side}: {:?}",
+            made.report.left_out
+        );
+        let found = extent(&made);
+        assert!((0..3).all(|k| (found[k] - expected[k]).abs() < 0.05), "{side}: {found:?} for {expected:?}");
+    }
+}
+
 #[test]
 fn views_from_one_direction_support_no_view_dependence() {
     let narrow = Scene {
@@ -582,10 +646,22 @@ fn no_views_or_only_empty_masks_are_errors() {
 }
 
 #[test]
-fn a_missing_mask_is_refused_by_the_hull_and_means_all_vehicle_with_depth() {
-    let mut scene = right_side(32, 24);
+fn a_missing_mask_is_the_outline_of_depth_that_shows_the_vehicle_alone_and_else_refused() {
+    let masked = right_side(64, 48);
+    let mut scene = masked.clone();
     scene.views[2].mask = None;
-    assert!(run(&scene, &Options::default()).report.gaussians > 0);
+    let made = run(&scene, &Options::default());
+    assert_eq!(left_out(&made, "the outline of the view's depth"), 1);
+    assert_eq!(made.gaussians, run(&masked, &Options::default()).gaussians);
+    // A wall behind the vehicle, as a depth camera sees it.
+    let wall = |z: &f32| if *z > 0.0 { *z } else { 20.0 };
+    let depth = scene.views[2].depth.as_ref().unwrap().depth().iter().map(wall).collect();
+    scene.views[2].depth = Some(DepthMap::new(64, 48, depth).unwrap());
+    let text = error(&scene, &Options::default());
+    assert!(
+        text.starts_with("views[2] (-105).mask: none, and its depth reaches the picture's border"),
+        "{text}"
+    );
     let text = error(&without_depth(scene), &Options::default());
     assert!(text.starts_with("views[2] (-105).mask: none"), "{text}");
 }

@@ -23,7 +23,8 @@ pub fn masks_of(folder: &Path) -> Result<MaskedViews> {
     if scene.views.len() < FEWEST_VIEWS {
         let (with, all) = (scene.views.len(), scene.views.len() + scene.unmasked);
         let reason = format!(
-            "{with} of {all} views have a mask; expected at least {FEWEST_VIEWS}, masks/<name of the picture>.png"
+            "{with} of {all} views have a mask; allowed: at least {FEWEST_VIEWS}. {}",
+            scene.notes.last().map_or("", String::as_str)
         );
         return Err(Error::format(folder, "masks", reason));
     }

@@ -89,8 +89,10 @@ pub unsafe extern "C" fn vg_scene_options_init(options: *mut vg_scene_options, s
     unsafe { guarded(std::ptr::null_mut(), || read::initialize("options", options, size)) }
 }
 
-/// Reads a COLMAP folder: a model (binary or text) in `sparse/0`, in `sparse` or in the folder itself, photographs
-/// in `images`, masks in `masks`, depth in `depth`.
+/// Reads a COLMAP folder: a model (binary or text) in `sparse/0`, in `sparse` or in the folder itself, of several
+/// numbered ones that with the most images; photographs in `images`, masks in `masks` or `mask` (`<stem>.png`,
+/// `<name>.png`, `<stem>_mask.png` or `<stem>.mask.png`; PNG, JPEG or NumPy), depth in `depth` (PNG, NumPy, PFM or
+/// EXR). Two colours of which one is black are a mask whatever the other is.
 ///
 /// - path: the folder; not NULL.
 /// - options: not NULL, because a COLMAP model needs `vehicle_from_world`.
@@ -106,7 +108,8 @@ pub unsafe extern "C" fn vg_colmap_open(
     unsafe { open(path, options, SceneFormat::Colmap, out, out_error) }
 }
 
-/// Reads a nerfstudio scene: a `transforms.json`, or a folder with one.
+/// Reads a nerfstudio or an instant-ngp scene: a `transforms.json`, or a folder with one. Masks and depth that the file
+/// does not list are looked for as in a COLMAP folder.
 ///
 /// - path: the file or folder; not NULL.
 /// - options: NULL for the default values.

@@ -24,8 +24,10 @@ pub struct vg_view {
     /// The photograph, RGB8, BGR8, RGBA8, BGRA8 or GRAY8, of the camera's size. RGB8 without gaps between rows is
     /// read in place; anything else is copied once.
     pub image: vg_image,
-    /// GRAY8, of the camera's size: 128 and above is vehicle. `data` NULL: the photograph's alpha is the mask; where
-    /// it has none, or one that is 255 throughout, every pixel is vehicle, which the silhouette priors refuse.
+    /// GRAY8, of the camera's size: 128 and above is vehicle; where no value is above 1, 1 is. A largest value between
+    /// is an error. `data` NULL: the photograph's alpha is the mask; where it has none, or one that is 255 throughout,
+    /// the outline of `depth` is, if that measures the vehicle alone (0 at the picture's border); else a
+    /// reconstruction is refused.
     pub mask: vg_image,
     /// DEPTH32F, of the camera's size. `data` NULL: not measured.
     pub depth: vg_image,

@@ -1,6 +1,7 @@
 //! OpenEXR, as far as a depth map needs it: one flat layer with a channel named Z, depth, Y, V or R.
 
 use super::depth::checked_size;
+use super::image::Wanted;
 use crate::error::{Error, Result};
 use exr::meta::MetaData;
 use exr::meta::attribute::Text;
@@ -8,13 +9,32 @@ use exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel};
 use std::io::Cursor;
 use std::path::Path;
 
+/// Most bytes of a block once it is unpacked, all channels together: 128 float channels of 8192 columns in the 16 rows
+/// that ZIP packs together. A block is decoded whole, in a few copies, whichever of its channels is wanted.
+const MAX_BLOCK: usize = 64 << 20;
+
 /// Width, height and values in row order. Other channels are decoded and dropped, block by block.
-pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<(u32, u32, Vec<f32>)> {
+pub(super) fn decode(bytes: &[u8], path: &Path, wanted: Option<Wanted>) -> Result<(u32, u32, Vec<f32>)> {
     let failed = |e: exr::error::Error| Error::format(path, "exr", format!("{e}; allowed: a whole file"));
     // The header first: its numbers are checked before anything is allocated by them.
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(failed)?;
     for header in &meta.headers {
-        checked_size(path, header.layer_size.width() as u64, header.layer_size.height() as u64)?;
+        let size = checked_size(path, header.layer_size.width() as u64, header.layer_size.height() as u64)?;
+        if let Some(wanted) = wanted.filter(|_| meta.headers.len() == 1) {
+            wanted.check_size(path, size)?;
+        }
+        let pixels = header.max_block_pixel_size();
+        let block = pixels.area().checked_mul(header.channels.bytes_per_pixel);
+        if block.is_none_or(|bytes| bytes > MAX_BLOCK) {
+            let reason = format!(
+                "{} in blocks of {}x{}, more than {} MiB each; allowed: fewer channels or rows in a block",
+                header.channels.list.len(),
+                pixels.width(),
+                pixels.height(),
+                MAX_BLOCK >> 20
+            );
+            return Err(Error::format(path, "channels", reason));
+        }
     }
     let channel = depth_channel(&meta, path)?;
 
@@ -81,12 +101,35 @@ mod tests {
         let y = AnyChannel::new("Y", FlatSamples::F16(halves));
         for compression in [Compression::Uncompressed, Compression::RLE, Compression::ZIP16] {
             for channels in [vec![z()], vec![r(), z()], vec![y.clone(), r()]] {
-                let found = decode(&file(channels, compression), Path::new("d.exr")).unwrap();
+                let found = decode(&file(channels, compression), Path::new("d.exr"), None).unwrap();
                 assert_eq!(found, (3, 2, values.to_vec()));
             }
         }
         let strange = AnyChannel::new("id", FlatSamples::U32(vec![7; 6]));
-        let error = decode(&file(vec![strange], Compression::RLE), Path::new("d.exr")).unwrap_err();
+        let error = decode(&file(vec![strange], Compression::RLE), Path::new("d.exr"), None).unwrap_err();
         assert!(error.to_string().contains("d.exr: channels: [\"id\"]"), "{error}");
+    }
+
+    #[test]
+    fn channels_whose_blocks_would_fill_the_memory_are_refused_by_the_header() {
+        // 8192 columns in blocks of 16 rows take 512 kB a channel. One row is enough of a header.
+        let wide = |channels: usize| {
+            let samples = || FlatSamples::F32(vec![1.0; 8192]);
+            let channel = |i: usize| AnyChannel::new(format!("c{i:04}").as_str(), samples());
+            let list = std::iter::once(AnyChannel::new("Z", samples())).chain((1..channels).map(channel));
+            let encoding = Encoding {
+                compression: Compression::ZIP16,
+                blocks: Blocks::ScanLines,
+                ..Encoding::default()
+            };
+            let channels = AnyChannels::sort(list.collect());
+            let layer = Layer::new((8192, 1), LayerAttributes::default(), encoding, channels);
+            let mut bytes = Cursor::new(Vec::new());
+            Image::from_layer(layer).write().to_buffered(&mut bytes).unwrap();
+            decode(bytes.get_ref(), Path::new("d.exr"), None)
+        };
+        assert!(wide(128).unwrap().2 == [1.0; 8192]);
+        let error = wide(129).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains("d.exr: channels: 129 in blocks of 8192x16, more than 64 MiB"), "{error}");
     }
 }

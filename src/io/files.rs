@@ -7,9 +7,36 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Read, Write};
 use std::path::{Component, Path, PathBuf};
 
-/// The whole file, if it is a file and not longer than `limit` bytes.
+/// The whole regular file, if it is not longer than `limit` bytes. A pipe or a device is refused before it is opened:
+/// opening a pipe that nobody writes to waits for ever.
 pub(crate) fn read_limited(path: &Path, limit: u64) -> Result<Vec<u8>> {
-    let file = File::open(path).map_err(|e| Error::io(path, e))?;
+    read_up_to(open_regular(path)?, path, limit)
+}
+
+/// As [`read_limited`], of a file that the caller named by itself, which may be a pipe.
+pub(crate) fn read_limited_or_piped(path: &Path, limit: u64) -> Result<Vec<u8>> {
+    read_up_to(File::open(path).map_err(|e| Error::io(path, e))?, path, limit)
+}
+
+/// Opens a regular file for reading; an error says what else is there.
+pub(crate) fn open_regular(path: &Path) -> Result<File> {
+    let io = |e| Error::io(path, e);
+    // Before it is opened, and again what was opened: the name may have changed hands between.
+    refuse_special(path, &fs::metadata(path).map_err(io)?)?;
+    let file = File::open(path).map_err(io)?;
+    refuse_special(path, &file.metadata().map_err(io)?)?;
+    Ok(file)
+}
+
+fn refuse_special(path: &Path, meta: &fs::Metadata) -> Result<()> {
+    match meta.file_type() {
+        kind if kind.is_file() => Ok(()),
+        kind if kind.is_dir() => Err(Error::format(path, "file", "is a folder; allowed: a file")),
+        _ => Err(Error::format(path, "file", "is a pipe, a socket or a device; allowed: a regular file")),
+    }
+}
+
+fn read_up_to(file: File, path: &Path, limit: u64) -> Result<Vec<u8>> {
     let meta = file.metadata().map_err(|e| Error::io(path, e))?;
     if meta.is_dir() {
         return Err(Error::format(path, "file", "is a folder; allowed: a file"));
@@ -27,19 +54,25 @@ pub(crate) fn read_limited(path: &Path, limit: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// Whether something other than a folder has this name. What is there need not be readable: reading it says why.
+pub(crate) fn is_there(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|meta| !meta.is_dir())
+}
+
 /// A path written in a scene file: relative, and inside the scene's folder, so that a scene from elsewhere
-/// reads nothing but itself. The error is the reason, without file and field.
+/// reads nothing but itself. Backslashes are taken for slashes, as Windows writes them. The error is the reason,
+/// without file and field.
 pub(crate) fn relative_inside(text: &str) -> std::result::Result<PathBuf, String> {
+    let leads_out =
+        || Err(format!("{text:?} leads out of the scene's folder; allowed: a relative path without .."));
+    let slashed = text.replace('\\', "/");
+    let has_drive = matches!(slashed.as_bytes(), [drive, b':', b'/', ..] if drive.is_ascii_alphabetic());
     let mut inside = PathBuf::new();
-    for component in Path::new(text).components() {
+    for component in Path::new(&slashed).components() {
         match component {
-            Component::Normal(part) => inside.push(part),
+            Component::Normal(part) if !has_drive => inside.push(part),
             Component::CurDir => {}
-            _ => {
-                return Err(format!(
-                    "{text:?} leads out of the scene's folder; allowed: a relative path without .."
-                ));
-            }
+            _ => return leads_out(),
         }
     }
     if inside.as_os_str().is_empty() || text.contains('\0') {
@@ -242,9 +275,11 @@ mod tests {
 
     #[test]
     fn paths_that_leave_the_folder_are_refused() {
-        for bad in ["", ".", "/etc/passwd", "../a.png", "images/../../a.png", "a\0b"] {
+        let bad = ["", ".", "/etc/passwd", "../a.png", "images/../../a.png", "a\0b"];
+        for bad in bad.into_iter().chain(["..\\a.png", "\\a.png", "C:\\cars\\a.png", "c:/a.png"]) {
             assert!(relative_inside(bad).is_err(), "{bad:?}");
         }
         assert_eq!(relative_inside("./images/a.png").unwrap(), Path::new("images/a.png"));
+        assert_eq!(relative_inside(".\\images\\a.png").unwrap(), Path::new("images/a.png"));
     }
 }

@@ -1,14 +1,15 @@
 //! Pictures and masks from PNG and JPEG files, and PNG files of what was rendered.
 
-use super::files::{read_limited, write_atomically};
-use super::npy;
+use super::files::{in_file, open_regular, read_limited, write_atomically};
+use super::mask;
 use crate::error::{Error, Result};
 use crate::geometry::camera::MAX_SIDE;
 use crate::scene::mask::VEHICLE_THRESHOLD;
 use crate::scene::{Mask, RgbImage};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::metadata::Orientation;
 use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageFormat, ImageReader};
-use std::io::Cursor;
+use std::io::{BufReader, Cursor};
 use std::path::Path;
 
 /// Longest picture file that is read. The largest picture, 8192 x 8192 at 16 bits and 4 channels, holds this
@@ -24,60 +25,88 @@ pub struct Picture {
     pub alpha: Option<Vec<u8>>,
 }
 
-/// A PNG or JPEG picture.
+/// What a picture is read for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wanted {
+    /// Width and height that it must have.
+    pub(crate) size: (u32, u32),
+    /// Whose size that is, for messages.
+    pub(crate) whose: &'static str,
+    /// Which of its pixels are meant where EXIF turns it.
+    pub(crate) exif: ExifPixels,
+}
+
+/// The pixels in which the camera of a picture is given that has an EXIF orientation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ExifPixels {
+    /// As stored unless only the turned picture has the size: COLMAP reads pictures so.
+    Stored,
+    /// Stored or turned (OpenCV reads pictures so), whichever has the size; where both have it is an error.
+    BySize,
+}
+
+impl Wanted {
+    /// Compares a size that nothing turns.
+    pub(crate) fn check_size(&self, path: &Path, found: (u32, u32)) -> Result<()> {
+        turn(path, found, Orientation::NoTransforms, Some(*self)).map(|_| ())
+    }
+}
+
+/// A PNG or JPEG picture. One that EXIF turns is refused: nothing here tells which of its pixels are meant.
 pub fn read(path: &Path) -> Result<Picture> {
     decode(&read_limited(path, MAX_FILE)?, path)
 }
 
 /// The same from bytes; `path` is for messages only.
 pub fn decode(bytes: &[u8], path: &Path) -> Result<Picture> {
-    let decoded = decode_any(bytes, path)?;
+    picture(decode_any(bytes, path, None)?)
+}
+
+/// The picture in a file, if it is the one that is wanted, which its header tells before a pixel is decoded.
+pub(crate) fn read_wanted(path: &Path, wanted: Wanted) -> Result<Picture> {
+    picture(decode_any(&read_limited(path, MAX_FILE)?, path, Some(wanted))?)
+}
+
+fn picture(decoded: DynamicImage) -> Result<Picture> {
     let alpha = transparency(&decoded);
     let rgb = decoded.into_rgb8();
     let (width, height) = rgb.dimensions();
     Ok(Picture { image: RgbImage::from_owner("image", width, height, rgb.into_raw())?, alpha })
 }
 
-/// A mask: luminance of [`VEHICLE_THRESHOLD`] and above is vehicle. A picture that is transparent somewhere is
-/// a cut-out, and counts by its alpha instead. Of a NumPy array, true counts, or [`VEHICLE_THRESHOLD`] and above.
+/// The mask in a PNG, JPEG or NumPy file; see [`super::mask`] for what is vehicle in it.
 pub fn read_mask(path: &Path) -> Result<Mask> {
-    decode_mask(&read_limited(path, MAX_FILE)?, path).map(|(mask, _)| mask)
+    mask::decode(&read_limited(path, MAX_FILE)?, path, None)
 }
 
-/// The mask and its largest value, which tells a mask of zeros and ones from an empty one.
-pub(crate) fn decode_mask(bytes: &[u8], path: &Path) -> Result<(Mask, u8)> {
-    let (width, height, values) = if npy::is_npy(bytes) {
-        npy::decode_mask(bytes, path)?
-    } else {
-        let decoded = decode_any(bytes, path)?;
-        let (width, height) = (decoded.width(), decoded.height());
-        (width, height, transparency(&decoded).unwrap_or_else(|| decoded.into_luma8().into_raw()))
-    };
-    let largest = values.iter().copied().max().unwrap_or(0);
-    Ok((Mask::from_strided("mask", &values, width, height, width as usize)?, largest))
+/// The same of a mask of the size that is wanted.
+pub(crate) fn read_mask_wanted(path: &Path, wanted: Wanted) -> Result<Mask> {
+    mask::decode(&read_limited(path, MAX_FILE)?, path, Some(wanted))
 }
 
-pub(crate) fn read_mask_and_largest(path: &Path) -> Result<(Mask, u8)> {
-    decode_mask(&read_limited(path, MAX_FILE)?, path)
-}
-
-/// A mask from the alpha of a picture.
-pub(crate) fn mask_of_alpha(width: u32, height: u32, alpha: &[u8]) -> Result<Mask> {
-    Mask::from_strided("alpha", alpha, width, height, width as usize)
+/// A mask from the alpha of the picture in `path`.
+pub(crate) fn mask_of_alpha(path: &Path, width: u32, height: u32, alpha: &[u8]) -> Result<Mask> {
+    Mask::from_strided("alpha", alpha, width, height, width as usize).map_err(|e| in_file(path, e))
 }
 
 /// Width and height, from the header alone.
 pub fn size(path: &Path) -> Result<(u32, u32)> {
-    let reader = ImageReader::open(path).map_err(|e| Error::io(path, e))?;
+    let reader = ImageReader::new(BufReader::new(open_regular(path)?));
     let reader = reader.with_guessed_format().map_err(|e| Error::io(path, e))?;
-    let size = reader.into_dimensions().map_err(|e| image_error(path, e))?;
+    let mut decoder = reader.into_decoder().map_err(|e| image_error(path, e))?;
+    let size = decoder.dimensions();
     check_size(path, size)?;
+    turn(path, size, exif_of(&mut decoder), None)?;
     Ok(size)
 }
 
 /// 16-bit grey values in row order, and the size.
-pub(crate) fn decode_gray16(bytes: &[u8], path: &Path) -> Result<(u32, u32, Vec<u16>)> {
-    match decode_any(bytes, path)? {
+pub(crate) fn decode_gray16(
+    bytes: &[u8],
+    path: &Path,
+    wanted: Option<Wanted>,
+) -> Result<(u32, u32, Vec<u16>)> {
+    match decode_any(bytes, path, wanted)? {
         DynamicImage::ImageLuma16(gray) => Ok((gray.width(), gray.height(), gray.into_raw())),
         other => Err(Error::format(
             path,
@@ -87,7 +116,8 @@ pub(crate) fn decode_gray16(bytes: &[u8], path: &Path) -> Result<(u32, u32, Vec<
     }
 }
 
-fn decode_any(bytes: &[u8], path: &Path) -> Result<DynamicImage> {
+/// The pixels of a PNG or a JPEG, turned as EXIF says where those are wanted.
+pub(super) fn decode_any(bytes: &[u8], path: &Path, wanted: Option<Wanted>) -> Result<DynamicImage> {
     let mut reader =
         ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| Error::io(path, e))?;
     match reader.format() {
@@ -103,9 +133,49 @@ fn decode_any(bytes: &[u8], path: &Path) -> Result<DynamicImage> {
     limits.max_image_height = Some(MAX_SIDE);
     limits.max_alloc = Some(MAX_FILE + (64 << 20));
     reader.limits(limits);
-    let decoder = reader.into_decoder().map_err(|e| image_error(path, e))?;
-    check_size(path, decoder.dimensions())?;
-    DynamicImage::from_decoder(decoder).map_err(|e| image_error(path, e))
+    let mut decoder = reader.into_decoder().map_err(|e| image_error(path, e))?;
+    let size = decoder.dimensions();
+    check_size(path, size)?;
+    let turn = turn(path, size, exif_of(&mut decoder), wanted)?;
+    let mut decoded = DynamicImage::from_decoder(decoder).map_err(|e| image_error(path, e))?;
+    decoded.apply_orientation(turn);
+    Ok(decoded)
+}
+
+/// The orientation that the file states; a tag that cannot be read states none.
+fn exif_of(decoder: &mut impl ImageDecoder) -> Orientation {
+    decoder.orientation().unwrap_or(Orientation::NoTransforms)
+}
+
+/// How the stored pixels, `stored` in size, are to be turned to be the ones that are wanted.
+fn turn(path: &Path, stored: (u32, u32), exif: Orientation, wanted: Option<Wanted>) -> Result<Orientation> {
+    use Orientation::{NoTransforms, Rotate90, Rotate90FlipH, Rotate270, Rotate270FlipH};
+    let lies = matches!(exif, Rotate90 | Rotate270 | Rotate90FlipH | Rotate270FlipH);
+    let shown = if lies { (stored.1, stored.0) } else { stored };
+    let unclear = || {
+        let reason = format!(
+            "{}, and the camera may be given in the pixels as stored (as COLMAP reads them) or as shown (as OpenCV does); allowed: 1. Where the camera is in the pixels as stored, drop the tag (exiftool -Orientation= FILE); where it is in those as shown, turn the pixels (mogrify -auto-orient FILE)",
+            exif.to_exif()
+        );
+        Err(Error::format(path, "EXIF orientation", reason))
+    };
+    let Some(Wanted { size, whose, exif: pixels }) = wanted else {
+        return if exif == NoTransforms { Ok(exif) } else { unclear() };
+    };
+    match (stored == size, shown == size) {
+        (true, _) if exif == NoTransforms || pixels == ExifPixels::Stored => Ok(NoTransforms),
+        (true, true) => unclear(),
+        (true, false) => Ok(NoTransforms),
+        (false, true) => Ok(exif),
+        (false, false) => {
+            let turned = match exif {
+                NoTransforms => String::new(),
+                _ => format!(" (EXIF orientation {})", exif.to_exif()),
+            };
+            let reason = format!("{}x{}{turned}, but {whose} is {}x{}", stored.0, stored.1, size.0, size.1);
+            Err(Error::format(path, "size", reason))
+        }
+    }
 }
 
 fn check_size(path: &Path, (width, height): (u32, u32)) -> Result<()> {
@@ -147,7 +217,8 @@ fn jpeg_is_whole(bytes: &[u8], path: &Path) -> Result<()> {
     Ok(())
 }
 
-fn transparency(decoded: &DynamicImage) -> Option<Vec<u8>> {
+/// Alpha in row order, where a pixel is transparent at all.
+pub(super) fn transparency(decoded: &DynamicImage) -> Option<Vec<u8>> {
     if !decoded.color().has_alpha() {
         return None;
     }
@@ -235,13 +306,51 @@ mod tests {
     }
 
     #[test]
-    fn a_16_bit_grey_picture_reads_as_8_bit_colour_and_as_a_mask() {
+    fn a_16_bit_grey_picture_reads_as_8_bit_colour() {
         let mut bytes = Cursor::new(Vec::new());
         let deep = image::ImageBuffer::from_fn(3, 2, |u, _| image::Luma([u as u16 * 257 * 100]));
         DynamicImage::ImageLuma16(deep).write_to(&mut bytes, ImageFormat::Png).unwrap();
         let decoded = decode(bytes.get_ref(), Path::new("a.png")).unwrap();
         assert_eq!(decoded.image.pixels()[..3], [[0; 3], [100; 3], [200; 3]]);
-        let (mask, largest) = decode_mask(bytes.get_ref(), Path::new("a.png")).unwrap();
-        assert_eq!((mask.vehicle_pixels(), largest), (2, 200));
+    }
+
+    /// A JPEG whose EXIF tells this orientation.
+    fn turned(width: u32, height: u32, orientation: u8) -> Vec<u8> {
+        let mut jpeg = Cursor::new(Vec::new());
+        let bright_top = |_, v| image::Luma([if v < height / 2 { 250 } else { 5 }]);
+        image::GrayImage::from_fn(width, height, bright_top).write_to(&mut jpeg, ImageFormat::Jpeg).unwrap();
+        // One entry of a little-endian TIFF: tag 0x112, one SHORT.
+        let entry = [1, 0, 0x12, 1, 3, 0, 1, 0, 0, 0, orientation, 0, 0, 0, 0, 0, 0, 0];
+        let exif = [&b"Exif\0\0II*\0\x08\0\0\0"[..], &entry].concat();
+        let length = (exif.len() as u16 + 2).to_be_bytes();
+        let jpeg = jpeg.into_inner();
+        [&jpeg[..2], &[0xff, 0xe1], &length, &exif, &jpeg[2..]].concat()
+    }
+
+    #[test]
+    fn exif_turns_a_picture_where_the_camera_s_size_says_so_and_is_refused_where_it_cannot() {
+        let path = Path::new("a.jpg");
+        let read = |width, height, orientation, size, exif| {
+            let wanted = Wanted { size, whose: "its camera", exif };
+            decode_any(&turned(width, height, orientation), path, Some(wanted)).map(DynamicImage::into_luma8)
+        };
+        use ExifPixels::{BySize, Stored};
+        let upright = read(16, 8, 1, (16, 8), BySize).unwrap();
+        assert!(upright.get_pixel(8, 1)[0] > 200 && upright.get_pixel(8, 6)[0] < 50);
+        for exif in [BySize, Stored] {
+            // Sides change places: the size tells.
+            assert_eq!(read(16, 8, 6, (16, 8), exif).unwrap(), upright);
+            let shown = read(16, 8, 6, (8, 16), exif).unwrap();
+            assert!(shown.get_pixel(6, 8)[0] > 200 && shown.get_pixel(1, 8)[0] < 50, "{exif:?}");
+            let error = read(16, 8, 6, (9, 16), exif).unwrap_err().to_string();
+            assert!(error.contains("size: 16x8 (EXIF orientation 6), but its camera is 9x16"), "{error}");
+        }
+        // They do not: only COLMAP's way of reading is known.
+        for (width, orientation) in [(16, 2), (16, 3), (16, 4), (8, 6), (8, 8)] {
+            let error = read(width, 8, orientation, (width, 8), BySize).unwrap_err().to_string();
+            assert!(error.contains(&format!("a.jpg: EXIF orientation: {orientation}")), "{error}");
+            assert!(read(width, 8, orientation, (width, 8), Stored).is_ok());
+            assert!(decode(&turned(width, 8, orientation), path).is_err());
+        }
     }
 }

@@ -3,13 +3,14 @@
 //! Poses are those of the files, `world_from_camera`; whether that world is the vehicle's frame is for
 //! [`super::scene`] to settle.
 
-use super::depth::{DepthFormat, MILLIMETRES};
-use super::files::read_limited;
+use super::beside::{Finder, mask_names};
+use super::files::{is_there, read_limited};
 use super::scene::SceneFormat;
 use super::{colmap, image, json, realcar, transforms};
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::scene::VehicleBox;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// A scene's views in the world of its files.
@@ -25,6 +26,8 @@ pub(super) struct Listing {
     pub(super) sparse_model: Option<PathBuf>,
     /// The vehicle's box in the world of the poses.
     pub(super) vehicle_box: Option<VehicleBox>,
+    /// What was chosen among several, a sentence each.
+    pub(super) notes: Vec<String>,
 }
 
 /// One view of a [`Listing`].
@@ -38,6 +41,8 @@ pub(super) struct ListedView {
     pub(super) image: PathBuf,
     pub(super) mask: Option<PathBuf>,
     pub(super) depth: Option<DepthFile>,
+    /// All names that were tried for the mask, for messages.
+    pub(super) mask_names: String,
 }
 
 /// A depth file and what its numbers mean.
@@ -45,8 +50,8 @@ pub(super) struct ListedView {
 pub struct DepthFile {
     /// PNG, NPY, PFM or EXR.
     pub path: PathBuf,
-    /// Metres per number in the file.
-    pub unit: f64,
+    /// Metres per number in the file, where the scene or the caller says; else integers are millimetres, floats metres.
+    pub unit: Option<f64>,
 }
 
 /// Lists the scene at `path`: a `transforms.json`, a folder with one, or else a COLMAP folder; or only what
@@ -63,56 +68,62 @@ pub(super) fn list(path: &Path, format: Option<SceneFormat>) -> Result<Listing> 
         return list_transforms(path);
     }
     let transforms = path.join("transforms.json");
-    if transforms.is_file() && format != Some(SceneFormat::Colmap) {
+    if is_there(&transforms) && format != Some(SceneFormat::Colmap) {
         return list_transforms(&transforms);
     }
     match find_colmap(path) {
-        Some(model) if format != Some(SceneFormat::Transforms) => list_colmap(path, &model),
+        Some(found) if format != Some(SceneFormat::Transforms) => list_colmap(path, found),
         _ => Err(Error::format(path, "scene", NO_SCENE)),
     }
 }
 
-/// The folder of the COLMAP model at or below `path`.
-pub(super) fn find_colmap(path: &Path) -> Option<PathBuf> {
-    colmap::find_model(path).or_else(|| realcar::find_model(path))
+/// The COLMAP model at or below `path`.
+pub(super) fn find_colmap(path: &Path) -> Option<colmap::Found> {
+    colmap::find(path).or_else(|| realcar::find_model(path))
 }
 
-const NO_SCENE: &str = "neither a transforms.json, nor a folder with one, nor a folder with a COLMAP model (cameras.bin and images.bin, or .txt, in sparse/0, in sparse, in itself, or as 3DRealCar has it in colmap_processed/pcd_rescale)";
+const NO_SCENE: &str = "neither a transforms.json, nor a folder with one, nor a folder with a COLMAP model (cameras.bin and images.bin, or .txt, in sparse/0 or another number, in sparse, in itself, or as 3DRealCar has it in colmap_processed/pcd_rescale)";
 
 fn list_transforms(path: &Path) -> Result<Listing> {
     let file = transforms::parse(&read_limited(path, json::MAX_FILE)?, path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
+    let mut finder = Finder::new(folder);
+    let common = common_folder(&file.frames);
+    // A file that lists depth for some frames has none for the others.
+    let lists_depth = file.frames.iter().any(|frame| frame.depth_file_path.is_some());
     let mut views = Vec::with_capacity(file.frames.len());
     for (i, frame) in file.frames.iter().enumerate() {
         let field = format!("frames[{i}]");
-        let mut image = folder.join(&frame.file_path);
-        // The NeRF synthetic scenes leave the extension out.
-        if frame.file_path.extension().is_none() && !image.is_file() {
-            image.set_extension("png");
-        }
+        let image = finder.picture(folder.join(&frame.file_path));
         let size = match frame.size {
             Some(size) => size,
             None => image::size(&image)?,
         };
         let in_images = frame.file_path.strip_prefix("images").unwrap_or(&frame.file_path);
+        let in_common = common.map_or(in_images, |c| frame.file_path.strip_prefix(c).unwrap_or(in_images));
+        let relative = [in_images, &frame.file_path, in_common];
         let mask = match &frame.mask_path {
             Some(mask) => Some(folder.join(mask)),
-            None => find_mask(&folder.join("masks"), &[in_images, &frame.file_path]),
+            None => finder.mask(&image, &relative),
         };
-        let unit = file.depth_unit.unwrap_or(MILLIMETRES);
-        let depth = frame.depth_file_path.as_ref().map(|d| DepthFile { path: folder.join(d), unit });
+        let depth = match &frame.depth_file_path {
+            Some(depth) => file.loads_depth.then(|| folder.join(depth)),
+            None if lists_depth || !file.loads_depth => None,
+            None => finder.depth(&image, &relative),
+        };
         views.push(ListedView {
             name: in_images.to_string_lossy().into_owned(),
             path_in_file: frame.file_path.to_string_lossy().into_owned(),
             camera: frame.camera(size, path, &field)?,
+            mask_names: mask_names(&image, in_common),
             image,
             mask,
-            depth,
+            depth: depth.map(|path| DepthFile { path, unit: file.depth_unit }),
         });
     }
     refuse_repeated(path, "file_path", &views)?;
     let not_vehicle_frame = file.moved_by.map(|key| {
-        (key, "not the identity: the poses were moved after they were measured, so that their world need not be the vehicle's frame. Pass the similarity from these poses to the vehicle's frame (--vehicle-from-world FILE), or drop the key if they are in it")
+        (key, "says that the poses were moved, so that their world need not be the vehicle's frame. Pass the similarity from these poses to the vehicle's frame (--vehicle-from-world FILE), or drop the key if they are in it")
     });
     Ok(Listing {
         source: path.to_owned(),
@@ -120,31 +131,42 @@ fn list_transforms(path: &Path) -> Result<Listing> {
         not_vehicle_frame,
         sparse_model: None,
         vehicle_box: file.vehicle_box,
+        notes: Vec::new(),
     })
 }
 
-/// `model` is the model's folder, at or below `path`.
-fn list_colmap(path: &Path, model: &Path) -> Result<Listing> {
-    let root = colmap_root(path, model);
-    let read = colmap::read_model(model)?;
+/// The folder that all pictures of a `transforms.json` lie in, by its first name.
+fn common_folder(frames: &[transforms::Frame]) -> Option<&OsStr> {
+    fn first(frame: &transforms::Frame) -> Option<&OsStr> {
+        let mut names = frame.file_path.iter();
+        names.next().filter(|_| names.next().is_some())
+    }
+    let folder = first(frames.first()?)?;
+    frames.iter().all(|frame| first(frame) == Some(folder)).then_some(folder)
+}
+
+/// `found` is the model, at or below `path`.
+fn list_colmap(path: &Path, found: colmap::Found) -> Result<Listing> {
+    let model = found.folder;
+    let root = colmap_root(path, &model);
+    let read = colmap::read_model(&model)?;
+    let mut finder = Finder::new(&root);
     let views = read.images.iter().map(|image| {
         let name = image.name.to_string_lossy().into_owned();
-        Ok(ListedView {
-            path_in_file: name.clone(),
-            name,
-            camera: read.camera_of(image)?,
-            image: realcar::find_image(&root, &image.name),
-            mask: find_mask(&root.join("masks"), &[&image.name])
-                .or_else(|| realcar::find_mask(&root, &image.name)),
-            depth: find_depth(&root.join("depth"), &image.name),
-        })
+        let camera = read.camera_of(image)?;
+        let picture = finder.picture(realcar::find_image(&root, &image.name));
+        let mask = finder.mask(&picture, &[&image.name]).or_else(|| realcar::find_mask(&root, &image.name));
+        let depth = finder.depth(&picture, &[&image.name]).map(|path| DepthFile { path, unit: None });
+        let mask_names = mask_names(&picture, &image.name);
+        Ok(ListedView { path_in_file: name.clone(), name, camera, image: picture, mask, depth, mask_names })
     });
     let reason = "missing: where a COLMAP model lies, how it is turned and how large it is are arbitrary, so that it is not in the vehicle's frame. Pass the similarity from the model to the vehicle's frame (--vehicle-from-world FILE)";
     Ok(Listing {
-        source: model.to_owned(),
         views: views.collect::<Result<_>>()?,
         not_vehicle_frame: Some(("vehicle_from_world", reason)),
-        sparse_model: Some(model.to_owned()),
+        sparse_model: Some(model.clone()),
+        source: model,
+        notes: found.note.into_iter().collect(),
         vehicle_box: None,
     })
 }
@@ -155,32 +177,6 @@ fn colmap_root(path: &Path, model: &Path) -> PathBuf {
     let absolute = std::path::absolute(model).unwrap_or_else(|_| model.to_owned());
     let root = absolute.ancestors().take(3).find(|folder| folder.join("images").is_dir());
     root.map_or_else(|| path.to_owned(), Path::to_owned)
-}
-
-/// `masks/<path with .png>`, else `masks/<path>.png` (COLMAP's 000.jpg.png), for the first path that has one.
-pub(super) fn find_mask(masks: &Path, relative: &[&Path]) -> Option<PathBuf> {
-    relative
-        .iter()
-        .flat_map(|path| {
-            let mut longer = masks.join(path).into_os_string();
-            longer.push(".png");
-            [masks.join(path).with_extension("png"), PathBuf::from(longer)]
-        })
-        .find(|candidate| candidate.is_file())
-}
-
-/// `depth/<path with .png, .npy, .pfm or .exr>`; integers are millimetres, floats metres.
-pub(super) fn find_depth(depth: &Path, relative: &Path) -> Option<DepthFile> {
-    let formats = [
-        ("png", DepthFormat::Png),
-        ("npy", DepthFormat::Npy),
-        ("pfm", DepthFormat::Pfm),
-        ("exr", DepthFormat::Exr),
-    ];
-    formats.into_iter().find_map(|(extension, format)| {
-        let path = depth.join(relative).with_extension(extension);
-        path.is_file().then(|| DepthFile { path, unit: format.default_unit() })
-    })
 }
 
 /// Two entries of one picture would be two views with one name.

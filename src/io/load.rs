@@ -1,10 +1,12 @@
 //! Reads the pixels of listed views, in parallel, and checks them against their cameras.
 
+use super::beside::{PICTURES, has_picture_extension};
+use super::files::is_there;
+use super::image::{ExifPixels, Wanted};
 use super::scene::SceneView;
 use super::{depth, image};
 use crate::error::{Error, Result};
 use crate::progress::Watch;
-use crate::scene::mask::VEHICLE_THRESHOLD;
 use crate::scene::view::MAX_VIEWS;
 use crate::scene::{Scene, View};
 use rayon::prelude::*;
@@ -12,7 +14,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The scene of these views, and notes on what is legal but looks like a mistake.
-pub(super) fn load(views: &[SceneView], watch: &Watch) -> Result<(Scene, Vec<String>)> {
+pub(super) fn load(views: &[SceneView], exif: ExifPixels, watch: &Watch) -> Result<(Scene, Vec<String>)> {
     // Before a picture is decoded, not after all are.
     if views.is_empty() || views.len() > MAX_VIEWS {
         return Err(Error::argument("views", views.len().to_string(), format!("1 to {MAX_VIEWS}")));
@@ -20,62 +22,60 @@ pub(super) fn load(views: &[SceneView], watch: &Watch) -> Result<(Scene, Vec<Str
     let read = AtomicUsize::new(0);
     let one = |view: &SceneView| {
         watch.check()?;
-        let loaded = load_view(view)?;
+        let loaded = load_view(view, exif)?;
         watch.report((read.fetch_add(1, Ordering::Relaxed) + 1) as f64 / views.len() as f64)?;
         Ok(loaded)
     };
-    let loaded: Vec<(View, Vec<String>)> = views.par_iter().map(one).collect::<Result<_>>()?;
-    let (views, notes): (Vec<View>, Vec<Vec<String>>) = loaded.into_iter().unzip();
-    let mut notes: Vec<String> = notes.into_iter().flatten().collect();
-    if views.iter().any(|v| v.mask.is_some()) {
-        let unmasked = views.iter().filter(|v| v.mask.is_none());
-        notes.extend(unmasked.map(|v| format!("{}: no mask, though other views have one", v.name)));
-    }
+    let loaded: Vec<(View, Option<String>)> = views.par_iter().map(one).collect::<Result<_>>()?;
+    let listed = views;
+    let (views, doubts): (Vec<View>, Vec<Option<String>>) = loaded.into_iter().unzip();
+    let mut notes: Vec<String> = doubts.into_iter().flatten().collect();
+    notes.extend(unmasked(listed, &views));
     let scene = Scene { views, ..Scene::default() };
     scene.validate()?;
     Ok((scene, notes))
 }
 
-fn load_view(listed: &SceneView) -> Result<(View, Vec<String>)> {
-    let mut notes = Vec::new();
-    let expected = (listed.camera.width, listed.camera.height);
-    let picture = image::read(&listed.image)?;
-    check_size(&listed.image, (picture.image.width(), picture.image.height()), expected, "its camera")?;
-
+fn load_view(listed: &SceneView, exif: ExifPixels) -> Result<(View, Option<String>)> {
+    let size = (listed.camera.width, listed.camera.height);
+    let of = |whose| Wanted { size, whose, exif };
+    if !has_picture_extension(&listed.image) && !is_there(&listed.image) {
+        let tried: Vec<String> = PICTURES.iter().map(|extension| format!(".{extension}")).collect();
+        let reason = format!("no such file, nor one with {} added", tried.join(", "));
+        return Err(Error::format(&listed.image, "picture", reason));
+    }
+    let picture = image::read_wanted(&listed.image, of("its camera"))?;
     let mask = match (&listed.mask, &picture.alpha) {
-        (Some(path), _) => {
-            let (mask, largest) = image::read_mask_and_largest(path)?;
-            check_size(path, (mask.width(), mask.height()), expected, "its picture")?;
-            if (1..VEHICLE_THRESHOLD).contains(&largest) {
-                notes.push(format!(
-                    "{}: the largest value is {largest}, and vehicle begins at {VEHICLE_THRESHOLD}: the mask is empty",
-                    path.display()
-                ));
-            }
-            Some(mask)
-        }
-        (None, Some(alpha)) => Some(image::mask_of_alpha(expected.0, expected.1, alpha)?),
+        (Some(path), _) => Some(image::read_mask_wanted(path, of("its picture"))?),
+        (None, Some(alpha)) => Some(image::mask_of_alpha(&listed.image, size.0, size.1, alpha)?),
         (None, None) => None,
     };
+    let mut doubt = None;
     let depth = match &listed.depth {
         None => None,
         Some(file) => {
-            let map = depth::read(&file.path, file.unit)?;
-            check_size(&file.path, (map.width(), map.height()), expected, "its picture")?;
-            notes.extend(implausible_depth(&file.path, map.depth(), file.unit));
+            let (map, unit) = depth::read_wanted(&file.path, file.unit, of("its picture"))?;
+            doubt = implausible_depth(&file.path, map.depth(), unit);
             Some(map)
         }
     };
     let view = View { name: listed.name.clone(), camera: listed.camera, image: picture.image, mask, depth };
-    Ok((view, notes))
+    Ok((view, doubt))
 }
 
-fn check_size(path: &Path, found: (u32, u32), expected: (u32, u32), whose: &str) -> Result<()> {
-    if found == expected {
-        return Ok(());
+/// One sentence on all views that have no mask, with the names that were tried.
+fn unmasked(listed: &[SceneView], views: &[View]) -> Option<String> {
+    /// How many views it names.
+    const SHOWN: usize = 8;
+    let without = listed.iter().zip(views).filter(|(_, view)| view.mask.is_none());
+    let unmasked: Vec<&SceneView> = without.map(|(listed, _)| listed).collect();
+    let tried = &unmasked.first()?.mask_names;
+    if unmasked.len() == views.len() {
+        return Some(format!("no view has a mask: looked for {tried}"));
     }
-    let reason = format!("{}x{}, but {whose} is {}x{}", found.0, found.1, expected.0, expected.1);
-    Err(Error::format(path, "size", reason))
+    let names: Vec<&str> = unmasked.iter().take(SHOWN).map(|view| view.name.as_str()).collect();
+    let more = if unmasked.len() > SHOWN { ", ..." } else { "" };
+    Some(format!("{}{more}: no mask, though other views have one: looked for {tried}", names.join(", ")))
 }
 
 /// Vehicles are photographed from metres away; a median outside 5 cm to 500 m is a wrong unit.

@@ -4,6 +4,7 @@
 //! Parsers work on bytes and touch no file system, so that they can be fuzzed. Writers replace a file only once
 //! the new one is complete.
 
+mod beside;
 pub mod colmap;
 pub mod depth;
 mod exr;
@@ -12,6 +13,7 @@ pub mod image;
 mod json;
 mod listing;
 mod load;
+mod mask;
 mod masked;
 mod npy;
 mod pfm;

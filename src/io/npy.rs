@@ -1,27 +1,45 @@
-//! NumPy's `.npy`, versions 1 to 3, as far as depth maps and masks need it: one array in C order, of little-endian f4
-//! or f8, or of booleans or bytes.
+//! NumPy's `.npy`, versions 1 to 3, as far as depth maps and masks need it: one array in C order, of little-endian
+//! floats or integers, or of booleans.
 
 use super::depth::checked_size;
 use crate::error::{Error, Result};
 use std::path::Path;
 
-/// Width, height and values in row order of a `[height][width]` array; axes of length one around it are dropped.
-pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<(u32, u32, Vec<f32>)> {
-    let array = array(bytes, path, &[("<f4", 4), ("<f8", 8)])?;
-    let values = if array.kind == "<f4" {
-        array.data.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
-    } else {
-        array.data.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b) as f32).collect()
-    };
-    Ok((array.width, array.height, values))
+/// Depths as a file holds them.
+#[derive(Debug)]
+pub(super) struct Depths {
+    pub(super) width: u32,
+    pub(super) height: u32,
+    /// In row order.
+    pub(super) values: Vec<f32>,
+    /// Whether the file holds integers.
+    pub(super) is_integer: bool,
 }
 
-/// The same of a mask: bytes as they are, of booleans 255 for true.
+const FLOATS: [(&str, usize); 2] = [("<f4", 4), ("<f8", 8)];
+const INTEGERS: [(&str, usize); 6] = [("<u2", 2), ("<i2", 2), ("<u4", 4), ("<i4", 4), ("<u8", 8), ("<i8", 8)];
+const BYTES: [(&str, usize); 3] = [("|b1", 1), ("|u1", 1), ("|i1", 1)];
+
+/// The values of a `[height][width]` array; axes of length one around it are dropped.
+pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<Depths> {
+    let array = array(bytes, path, &[&FLOATS[..], &INTEGERS].concat())?;
+    let is_integer = !FLOATS.iter().any(|float| float.0 == array.kind);
+    let values = array.values().map(|v| v as f32).collect();
+    Ok(Depths { width: array.width, height: array.height, values, is_integer })
+}
+
+/// The same of a mask: integers as they are, 255 for true.
 pub(super) fn decode_mask(bytes: &[u8], path: &Path) -> Result<(u32, u32, Vec<u8>)> {
-    let array = array(bytes, path, &[("|b1", 1), ("|u1", 1)])?;
-    let is_truth = array.kind == "|b1";
-    let value = |&b: &u8| if is_truth { 255 * u8::from(b != 0) } else { b };
-    Ok((array.width, array.height, array.data.iter().map(value).collect()))
+    let array = array(bytes, path, &[&BYTES[..], &INTEGERS].concat())?;
+    if array.kind == "|b1" {
+        let values = array.data.iter().map(|&b| if b != 0 { u8::MAX } else { 0 }).collect();
+        return Ok((array.width, array.height, values));
+    }
+    let beyond = array.values().find(|v| !(0.0..=255.0).contains(v));
+    if let Some(value) = beyond {
+        return Err(Error::format(path, "data", format!("{value} in a mask; allowed: 0 to 255")));
+    }
+    Ok((array.width, array.height, array.values().map(|v| v as u8).collect()))
 }
 
 /// Whether these are the first bytes of such a file.
@@ -35,7 +53,28 @@ struct Array<'a> {
     width: u32,
     height: u32,
     kind: &'static str,
+    /// Bytes of a number.
+    item: usize,
     data: &'a [u8],
+}
+
+impl<'a> Array<'a> {
+    /// The numbers in row order; integers of 64 bits to 53.
+    fn values(&self) -> impl Iterator<Item = f64> + use<'a> {
+        let number = match self.kind {
+            "<f4" => |b: &[u8]| f64::from(f32::from_le_bytes(b.try_into().unwrap_or_default())),
+            "<f8" => |b: &[u8]| f64::from_le_bytes(b.try_into().unwrap_or_default()),
+            "<u2" => |b: &[u8]| f64::from(u16::from_le_bytes(b.try_into().unwrap_or_default())),
+            "<i2" => |b: &[u8]| f64::from(i16::from_le_bytes(b.try_into().unwrap_or_default())),
+            "<u4" => |b: &[u8]| f64::from(u32::from_le_bytes(b.try_into().unwrap_or_default())),
+            "<i4" => |b: &[u8]| f64::from(i32::from_le_bytes(b.try_into().unwrap_or_default())),
+            "<u8" => |b: &[u8]| u64::from_le_bytes(b.try_into().unwrap_or_default()) as f64,
+            "<i8" => |b: &[u8]| i64::from_le_bytes(b.try_into().unwrap_or_default()) as f64,
+            "|i1" => |b: &[u8]| f64::from(b[0] as i8),
+            _ => |b: &[u8]| f64::from(b[0]),
+        };
+        self.data.chunks_exact(self.item).map(number)
+    }
 }
 
 /// An array whose items are of one of `kinds`, each with its size in bytes.
@@ -77,7 +116,7 @@ fn array<'a>(bytes: &'a [u8], path: &Path, kinds: &[(&'static str, usize)]) -> R
     if data.len() != expected {
         return Err(error("data", format!("{} bytes; the shape needs {expected}", data.len())));
     }
-    Ok(Array { width, height, kind, data })
+    Ok(Array { width, height, kind, item, data })
 }
 
 /// Header text and data.
@@ -135,12 +174,30 @@ mod tests {
     }
 
     #[test]
-    fn masks_are_booleans_or_bytes() {
+    fn masks_are_booleans_or_integers_of_a_byte_s_range() {
         let header = |descr| format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (1, 3), }}");
-        let decode = |descr| decode_mask(&file(1, &header(descr), &[0, 1, 200]), Path::new("m.npy"));
-        assert_eq!(decode("|b1").unwrap(), (3, 1, vec![0, 255, 255]));
-        assert_eq!(decode("|u1").unwrap(), (3, 1, vec![0, 1, 200]));
-        assert!(decode("<f4").unwrap_err().to_string().contains("'|b1' or '|u1'"));
+        let decode = |descr, data: &[u8]| decode_mask(&file(1, &header(descr), data), Path::new("m.npy"));
+        assert_eq!(decode("|b1", &[0, 1, 200]).unwrap(), (3, 1, vec![0, 255, 255]));
+        assert_eq!(decode("|u1", &[0, 1, 200]).unwrap(), (3, 1, vec![0, 1, 200]));
+        let long: Vec<u8> = [0i64, 1, 200].iter().flat_map(|v| v.to_le_bytes()).collect();
+        assert_eq!(decode("<i8", &long).unwrap(), (3, 1, vec![0, 1, 200]));
+        assert!(decode("|i1", &[0, 1, 200]).unwrap_err().to_string().contains("m.npy: data: -56 in a mask"));
+        assert!(decode("<f4", &[0; 12]).unwrap_err().to_string().contains("'|b1' or '|u1'"));
+    }
+
+    #[test]
+    fn integers_of_any_width_are_the_same_depths_and_told_from_floats() {
+        let header = |descr| format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (1, 2), }}");
+        let numbers: [(&str, Vec<u8>); 4] = [
+            ("<u2", [7u16, 1234].iter().flat_map(|v| v.to_le_bytes()).collect()),
+            ("<i2", [7i16, 1234].iter().flat_map(|v| v.to_le_bytes()).collect()),
+            ("<i4", [7i32, 1234].iter().flat_map(|v| v.to_le_bytes()).collect()),
+            ("<u8", [7u64, 1234].iter().flat_map(|v| v.to_le_bytes()).collect()),
+        ];
+        for (descr, data) in numbers {
+            let found = decode(&file(1, &header(descr), &data), Path::new("d.npy")).unwrap();
+            assert_eq!((found.values, found.is_integer), (vec![7.0, 1234.0], true), "{descr}");
+        }
     }
 
     #[test]
@@ -148,8 +205,9 @@ mod tests {
         let data: Vec<u8> = (0..6).flat_map(|i| (i as f32).to_le_bytes()).collect();
         for (version, shape) in [(1, "(2, 3)"), (2, "(2, 3, 1)"), (3, "(1, 2, 3)")] {
             let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}   \n");
-            let (w, h, values) = decode(&file(version, &header, &data), Path::new("d.npy")).unwrap();
-            assert_eq!((w, h, values), (3, 2, vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0]));
+            let found = decode(&file(version, &header, &data), Path::new("d.npy")).unwrap();
+            assert_eq!((found.width, found.height, found.is_integer), (3, 2, false));
+            assert_eq!(found.values, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
         }
     }
 

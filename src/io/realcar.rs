@@ -15,9 +15,9 @@ const PROCESSED: &str = "colmap_processed";
 const RESCALED: &str = "pcd_rescale";
 
 /// The COLMAP model of the vehicle in `folder`, the rescaled one where there are both.
-pub(super) fn find_model(folder: &Path) -> Option<PathBuf> {
+pub(super) fn find_model(folder: &Path) -> Option<colmap::Found> {
     let processed = folder.join(PROCESSED);
-    [processed.join(RESCALED), processed].iter().find_map(|folder| colmap::find_model(folder))
+    [processed.join(RESCALED), processed].iter().find_map(|folder| colmap::find(folder))
 }
 
 /// The scan of the vehicle in `folder`: the PLY file that the phone's recordings hold, else the one beside the rescaled

@@ -1,7 +1,8 @@
 //! Opens a scene on disk: first a listing of names, cameras and files, then the pixels of the views asked for.
 
 use super::files::in_file;
-use super::listing::{self, Listing};
+use super::image::ExifPixels;
+use super::listing::{self, ListedView, Listing};
 use super::{colmap, load, select};
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, Similarity};
@@ -21,7 +22,8 @@ pub struct SceneOptions {
     /// Takes the world of the poses to the vehicle's frame. A COLMAP model needs one; a `transforms.json` is
     /// taken to be in the vehicle's frame without.
     pub vehicle_from_world: Option<Similarity>,
-    /// Metres per number in the depth files, instead of what the scene says.
+    /// Metres per number in the depth files, instead of what the scene says. Where neither says, integers are
+    /// millimetres and floats metres.
     pub depth_scale: Option<f64>,
     /// Whether depth files are read where there are any.
     pub load_depth: bool,
@@ -54,6 +56,8 @@ pub struct SceneIndex {
     pub views: Vec<SceneView>,
     /// The vehicle's box in its own frame, where the scene file tells it.
     pub vehicle_box: Option<VehicleBox>,
+    /// What was chosen among several, a sentence each.
+    pub notes: Vec<String>,
     sparse_model: Option<PathBuf>,
     vehicle_from_world: Option<Similarity>,
 }
@@ -71,6 +75,8 @@ pub struct SceneView {
     pub mask: Option<PathBuf>,
     /// The depth map, where there is a file for it.
     pub depth: Option<DepthFile>,
+    /// All names that were tried for the mask, for messages.
+    pub(super) mask_names: String,
 }
 
 /// A camera and what it is called.
@@ -100,7 +106,7 @@ pub fn list_scene(path: &Path, options: &SceneOptions) -> Result<SceneIndex> {
     {
         return Err(Error::argument("depth_scale", unit.to_string(), "metres per unit, above 0"));
     }
-    let Listing { source, mut views, not_vehicle_frame, sparse_model, vehicle_box } =
+    let Listing { source, mut views, not_vehicle_frame, sparse_model, vehicle_box, notes } =
         listing::list(path, options.format)?;
     if let (None, Some((field, reason))) = (&options.vehicle_from_world, not_vehicle_frame) {
         return Err(Error::format(&source, field, reason));
@@ -115,8 +121,9 @@ pub fn list_scene(path: &Path, options: &SceneOptions) -> Result<SceneIndex> {
         }
         camera.validate(&view.name)?;
         let depth = view.depth.filter(|_| options.load_depth);
-        let depth = depth.map(|d| DepthFile { unit: options.depth_scale.unwrap_or(d.unit), ..d });
-        Ok(SceneView { name: view.name, camera, image: view.image, mask: view.mask, depth })
+        let depth = depth.map(|d| DepthFile { unit: options.depth_scale.or(d.unit), ..d });
+        let ListedView { name, image, mask, mask_names, .. } = view;
+        Ok(SceneView { name, camera, image, mask, depth, mask_names })
     });
     let views = views.collect::<Result<_>>()?;
     let vehicle_from_world = options.vehicle_from_world;
@@ -126,7 +133,7 @@ pub fn list_scene(path: &Path, options: &SceneOptions) -> Result<SceneIndex> {
         }
         (known, _) => known,
     };
-    Ok(SceneIndex { source, views, vehicle_box, sparse_model, vehicle_from_world })
+    Ok(SceneIndex { source, views, vehicle_box, notes, sparse_model, vehicle_from_world })
 }
 
 /// Lists the scene at `path` and reads the pictures, masks and depth maps of the views asked for.
@@ -163,8 +170,14 @@ impl SceneIndex {
     }
 
     fn load_watched(self, watch: &Watch) -> Result<SceneFiles> {
-        let (mut scene, notes) = load::load(&self.views, watch)?;
+        let (mut scene, found) = load::load(&self.views, self.exif(), watch)?;
         scene.vehicle_box = self.vehicle_box;
+        let notes = self.notes.iter().cloned().chain(found).collect();
         Ok(SceneFiles { index: self, scene, notes })
+    }
+
+    /// How its pictures were read when their cameras were found.
+    fn exif(&self) -> ExifPixels {
+        if self.sparse_model.is_some() { ExifPixels::Stored } else { ExifPixels::BySize }
     }
 }

@@ -1,5 +1,8 @@
-//! nerfstudio's `transforms.json`: intrinsics shared or per frame, camera-to-world poses with OpenGL axes, and
-//! the files of each frame. Nothing here touches the file system.
+//! nerfstudio's `transforms.json`, and instant-ngp's: intrinsics shared or per frame, camera-to-world poses with
+//! OpenGL axes, and the files of each frame. Nothing here touches the file system.
+//!
+//! Keys that change what a picture or a pose means are honoured or refused. Those that tell a trainer how to go about
+//! it (`aabb_scale`, `scale`, `offset`, `train_filenames`, `sharpness`, ...) change nothing: poses are as written.
 
 use super::files::{in_file, relative_inside};
 use crate::error::{Error, Result};
@@ -9,6 +12,7 @@ use crate::geometry::{Camera, CameraModel, Distortion, Intrinsics, Pose};
 use crate::scene::{Place, VehicleBox};
 use serde::Deserialize;
 use serde::de::{SeqAccess, Visitor};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// What the file says.
@@ -16,9 +20,11 @@ use std::path::{Path, PathBuf};
 pub struct Transforms {
     /// In the file's order; at least one.
     pub frames: Vec<Frame>,
-    /// `depth_unit_scale_factor`: metres per number in a depth file.
+    /// `depth_unit_scale_factor` or `integer_depth_scale`: metres per number in a depth file.
     pub depth_unit: Option<f64>,
-    /// The key that says that the poses were moved from where they were measured, if one does.
+    /// Whether depth is wanted: not with `enable_depth_loading` false.
+    pub loads_depth: bool,
+    /// The key that says that the poses were moved from where they were measured, or that z is not up, if one does.
     pub moved_by: Option<&'static str>,
     /// `vehicle_box`: `{"size": [length, width, height]}`, or with `"center": [x, y, z], "yaw": radians` in the world of
     /// the poses.
@@ -32,7 +38,7 @@ pub struct Frame {
     pub file_path: PathBuf,
     /// `mask_path`, likewise.
     pub mask_path: Option<PathBuf>,
-    /// `depth_file_path`, likewise.
+    /// `depth_file_path` or `depth_path`, likewise.
     pub depth_file_path: Option<PathBuf>,
     /// `world_from_camera` with our camera axes.
     pub world_from_camera: Pose,
@@ -41,67 +47,124 @@ pub struct Frame {
     lens: Lens,
 }
 
-/// The keys of a camera, each of which may stand in the frame or, for all frames, at the top.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Lens {
-    w: Option<f64>,
-    h: Option<f64>,
-    fl_x: Option<f64>,
-    fl_y: Option<f64>,
-    cx: Option<f64>,
-    cy: Option<f64>,
-    camera_angle_x: Option<f64>,
-    camera_angle_y: Option<f64>,
-    k1: Option<f64>,
-    k2: Option<f64>,
-    k3: Option<f64>,
-    k4: Option<f64>,
-    k5: Option<f64>,
-    k6: Option<f64>,
-    p1: Option<f64>,
-    p2: Option<f64>,
-    camera_model: Option<String>,
+/// Hands the keys of a camera on, each of which may stand in the frame or, for all frames, at the top; then those that
+/// cannot be honoured.
+macro_rules! with_keys {
+    ($then:ident! $($rest:tt)*) => {
+        $then! {
+            $($rest)*
+            [
+                w h fl_x fl_y cx cy camera_angle_x camera_angle_y x_fov y_fov
+                k1 k2 k3 k4 k5 k6 p1 p2
+            ]
+            [
+                ftheta_p0 latlong equirectangular
+                transform_matrix_start transform_matrix_end
+                white_transparent black_transparent
+            ]
+        }
+    };
 }
 
-/// Declares a part of the document that may hold camera keys beside its own: serde's `flatten` would do, but it
-/// copies every unknown key and loses where an error is.
-macro_rules! with_lens {
-    (struct $name:ident { $($(#[$meta:meta])* $field:ident: $type:ty,)* } [$($key:ident)*]) => {
-        #[derive(Deserialize)]
-        struct $name {
-            $($(#[$meta])* $field: $type,)*
+/// Declares a camera's keys.
+macro_rules! lens {
+    ([$($key:ident)*] [$($refused:ident)*]) => {
+        #[derive(Clone, Debug, Default, PartialEq)]
+        struct Lens {
             $($key: Option<f64>,)*
             camera_model: Option<String>,
         }
-        impl $name {
-            /// These camera keys; those that are missing from `shared`.
-            fn lens(&self, shared: &Lens) -> Lens {
-                Lens {
+        impl Lens {
+            /// These keys; those that are missing from `shared`.
+            fn or(self, shared: Self) -> Self {
+                Self {
                     $($key: self.$key.or(shared.$key),)*
-                    camera_model: self.camera_model.clone().or_else(|| shared.camera_model.clone()),
+                    camera_model: self.camera_model.or(shared.camera_model),
                 }
             }
         }
     };
 }
 
-with_lens! {
-    struct DocumentJson {
-        frames: Vec<FrameJson>,
-        depth_unit_scale_factor: Option<f64>,
-        applied_transform: Option<Rows>,
-        applied_scale: Option<f64>,
-        vehicle_box: Option<BoxJson>,
-    } [w h fl_x fl_y cx cy camera_angle_x camera_angle_y k1 k2 k3 k4 k5 k6 p1 p2]
+/// Declares a part of the document that may hold camera keys beside its own: serde's `flatten` would do, but it
+/// copies every unknown key and loses where an error is.
+macro_rules! with_lens {
+    (
+        struct $name:ident { $($(#[$meta:meta])* $field:ident: $type:ty,)* }
+        [$($key:ident)*] [$($refused:ident)*]
+    ) => {
+        #[derive(Deserialize)]
+        struct $name {
+            $($(#[$meta])* $field: $type,)*
+            $($key: Option<f64>,)*
+            camera_model: Option<String>,
+            is_fisheye: Option<bool>,
+            distortion_params: Option<Vec<f64>>,
+            $($refused: Option<Value>,)*
+        }
+        impl $name {
+            /// The camera keys that stand here.
+            fn lens(&self) -> std::result::Result<Lens, (&'static str, String)> {
+                let refused = [$((stringify!($refused), &self.$refused),)*];
+                let is_set = |value: &Option<Value>| value.as_ref().is_some_and(is_set);
+                if let Some((key, _)) = refused.into_iter().find(|(_, value)| is_set(value)) {
+                    return Err((key, why_refused(key).into()));
+                }
+                let lens = Lens { $($key: self.$key,)* camera_model: self.camera_model.clone() };
+                lens.with_fisheye(self.is_fisheye)?.with_distortion_params(self.distortion_params.as_deref())
+            }
+        }
+    };
 }
 
-with_lens! {
+with_keys! { lens! }
+
+with_keys! { with_lens!
+    struct DocumentJson {
+        frames: Vec<FrameJson>,
+        n_frames: Option<u64>,
+        depth_unit_scale_factor: Option<f64>,
+        integer_depth_scale: Option<f64>,
+        enable_depth_loading: Option<bool>,
+        applied_transform: Option<Rows>,
+        applied_scale: Option<f64>,
+        orientation_override: Option<String>,
+        vehicle_box: Option<BoxJson>,
+        up: Option<[f64; 3]>,
+    }
+}
+
+with_keys! { with_lens!
     struct FrameJson {
         file_path: String,
         mask_path: Option<String>,
         depth_file_path: Option<String>,
+        depth_path: Option<String>,
         transform_matrix: Rows,
-    } [w h fl_x fl_y cx cy camera_angle_x camera_angle_y k1 k2 k3 k4 k5 k6 p1 p2]
+    }
+}
+
+/// Whether a value switches its key on.
+fn is_set(value: &Value) -> bool {
+    match value {
+        Value::Null | Value::Bool(false) => false,
+        Value::Number(number) => number.as_f64() != Some(0.0),
+        _ => true,
+    }
+}
+
+fn why_refused(key: &str) -> &'static str {
+    match key {
+        "transform_matrix_start" | "transform_matrix_end" => {
+            "a camera that moves during the exposure is not understood; allowed: transform_matrix alone"
+        }
+        "white_transparent" | "black_transparent" => {
+            "a colour instead of a mask is not understood; allowed: mask_path, a folder masks, or an alpha channel"
+        }
+        _ => {
+            "this lens is not understood; allowed: camera_model with its coefficients. Undistort the pictures first"
+        }
+    }
 }
 
 /// See [`Transforms::vehicle_box`].
@@ -173,24 +236,57 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Transforms> {
     if document.frames.is_empty() {
         return Err(Error::format(path, "frames", "empty; allowed: at least one frame"));
     }
-    if let Some(unit) = document.depth_unit_scale_factor
-        && !(unit > 0.0 && unit.is_finite())
-    {
-        let reason = format!("{unit}; allowed: metres per unit, above 0");
-        return Err(Error::format(path, "depth_unit_scale_factor", reason));
+    if let Some(n) = document.n_frames.filter(|&n| n < document.frames.len() as u64) {
+        let reason =
+            format!("{n}, but there are {} frames; allowed: as many, or no key", document.frames.len());
+        return Err(Error::format(path, "n_frames", reason));
     }
-    let shared = document.lens(&Lens::default());
+    let shared = document.lens().map_err(|(key, reason)| Error::format(path, key, reason))?;
     let frames = document.frames.iter().enumerate();
     let frames =
         frames.map(|(i, f)| frame(f, &shared, path, &format!("frames[{i}]"))).collect::<Result<_>>()?;
-    const IDENTITY: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
-    let moved_by = if document.applied_transform.is_some_and(|t| t.0 != IDENTITY) {
-        Some("applied_transform")
-    } else {
-        document.applied_scale.filter(|&s| s != 1.0).map(|_| "applied_scale")
-    };
+    let depth_unit = document.depth_unit(path)?;
+    let loads_depth = document.enable_depth_loading.unwrap_or(true);
+    let moved_by = document.moved_by();
     let vehicle_box = document.vehicle_box.map(|known| known.checked(path)).transpose()?;
-    Ok(Transforms { frames, depth_unit: document.depth_unit_scale_factor, moved_by, vehicle_box })
+    Ok(Transforms { frames, depth_unit, loads_depth, moved_by, vehicle_box })
+}
+
+impl DocumentJson {
+    /// Metres per number in a depth file: nerfstudio's key or instant-ngp's.
+    fn depth_unit(&self, path: &Path) -> Result<Option<f64>> {
+        let keys = [
+            ("depth_unit_scale_factor", self.depth_unit_scale_factor),
+            ("integer_depth_scale", self.integer_depth_scale),
+        ];
+        for (key, unit) in keys {
+            if let Some(unit) = unit.filter(|unit| !(*unit > 0.0 && unit.is_finite())) {
+                let reason = format!("{unit}; allowed: metres per unit, above 0");
+                return Err(Error::format(path, key, reason));
+            }
+        }
+        match (self.depth_unit_scale_factor, self.integer_depth_scale) {
+            (Some(unit), Some(other)) if unit != other => {
+                let reason = format!("{other}, but depth_unit_scale_factor is {unit}; allowed: one of them");
+                Err(Error::format(path, "integer_depth_scale", reason))
+            }
+            (unit, other) => Ok(unit.or(other)),
+        }
+    }
+
+    fn moved_by(&self) -> Option<&'static str> {
+        const IDENTITY: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+        /// Cosine of the angle between what the file calls up and z, some 8 degrees.
+        const UPRIGHT: f64 = 0.99;
+        let is_up = |up: [f64; 3]| up[2] >= UPRIGHT * up.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let keys = [
+            ("applied_transform", self.applied_transform.as_ref().is_some_and(|t| t.0 != IDENTITY)),
+            ("applied_scale", self.applied_scale.is_some_and(|s| s != 1.0)),
+            ("orientation_override", self.orientation_override.as_ref().is_some_and(|how| how != "none")),
+            ("up", self.up.is_some_and(|up| !is_up(up))),
+        ];
+        keys.into_iter().find(|(_, moved)| *moved).map(|(key, _)| key)
+    }
 }
 
 fn frame(json: &FrameJson, shared: &Lens, path: &Path, field: &str) -> Result<Frame> {
@@ -201,7 +297,8 @@ fn frame(json: &FrameJson, shared: &Lens, path: &Path, field: &str) -> Result<Fr
         None | Some("") => Ok(None),
         Some(text) => file(key, text).map(Some),
     };
-    let lens = json.lens(shared);
+    let own = json.lens().map_err(|(key, reason)| Error::format(path, format!("{field}.{key}"), reason))?;
+    let lens = own.over(shared);
     let size = match (lens.w, lens.h) {
         (None, None) => None,
         (Some(w), Some(h)) => {
@@ -220,11 +317,20 @@ fn frame(json: &FrameJson, shared: &Lens, path: &Path, field: &str) -> Result<Fr
             ));
         }
     };
+    let depths =
+        [optional("depth_file_path", &json.depth_file_path)?, optional("depth_path", &json.depth_path)?];
+    let depth_file_path = match depths {
+        [Some(depth), Some(other)] if depth != other => {
+            let reason = format!("{other:?}, but depth_file_path is {depth:?}; allowed: one of them");
+            return Err(Error::format(path, format!("{field}.depth_path"), reason));
+        }
+        [depth, other] => depth.or(other),
+    };
     let pose = pose_from_opengl(&format!("{field}.transform_matrix"), &json.transform_matrix.0);
     let frame = Frame {
         file_path: file("file_path", &json.file_path)?,
         mask_path: optional("mask_path", &json.mask_path)?,
-        depth_file_path: optional("depth_file_path", &json.depth_file_path)?,
+        depth_file_path,
         world_from_camera: pose.map_err(|e| in_file(path, e))?,
         size,
         lens,
@@ -240,14 +346,17 @@ impl Frame {
         let lens = &self.lens;
         let (w, h) = (f64::from(width), f64::from(height));
         let from_angle = |size: f64, angle: f64| 0.5 * size / (0.5 * angle).tan();
-        let fx = lens.fl_x.or(lens.camera_angle_x.map(|a| from_angle(w, a)));
-        let fy = lens.fl_y.or(lens.camera_angle_y.map(|a| from_angle(h, a)));
+        let focal = |length: Option<f64>, angle: Option<f64>, degrees: Option<f64>, size: f64| {
+            length.or_else(|| angle.or(degrees.map(f64::to_radians)).map(|a| from_angle(size, a)))
+        };
+        let fx = focal(lens.fl_x, lens.camera_angle_x, lens.x_fov, w);
+        let fy = focal(lens.fl_y, lens.camera_angle_y, lens.y_fov, h);
         // Square pixels unless both are given.
         let (Some(fx), Some(fy)) = (fx.or(fy), fy.or(fx)) else {
             return Err(Error::format(
                 path,
                 format!("{field}.fl_x"),
-                "missing; allowed: fl_x (and fl_y) or camera_angle_x, in the frame or at the top",
+                "missing; allowed: fl_x (and fl_y), camera_angle_x or x_fov, in the frame or at the top",
             ));
         };
         let intrinsics =
@@ -265,6 +374,52 @@ impl Frame {
 }
 
 impl Lens {
+    /// instant-ngp says with a switch what nerfstudio says with a name.
+    fn with_fisheye(mut self, is_fisheye: Option<bool>) -> std::result::Result<Self, (&'static str, String)> {
+        let Some(is_fisheye) = is_fisheye else { return Ok(self) };
+        let [fisheye, brown] = [CameraModel::OpenCvFisheye, CameraModel::OpenCv].map(CameraModel::name);
+        match self.camera_model.as_deref() {
+            None => self.camera_model = Some(if is_fisheye { fisheye } else { brown }.to_owned()),
+            Some(name) if (name == fisheye) == is_fisheye => {}
+            Some(name) => {
+                let reason = format!("{is_fisheye}, but camera_model is {name:?}; allowed: one of them");
+                return Err(("is_fisheye", reason));
+            }
+        }
+        Ok(self)
+    }
+
+    /// nerfstudio's list of all coefficients.
+    fn with_distortion_params(
+        mut self,
+        params: Option<&[f64]>,
+    ) -> std::result::Result<Self, (&'static str, String)> {
+        let Some(params) = params else { return Ok(self) };
+        let key = "distortion_params";
+        let &[k1, k2, k3, k4, p1, p2] = params else {
+            return Err((key, format!("{} numbers; allowed: six, k1 k2 k3 k4 p1 p2", params.len())));
+        };
+        let single = [self.k1, self.k2, self.k3, self.k4, self.k5, self.k6, self.p1, self.p2];
+        if single.iter().any(Option::is_some) {
+            return Err((key, "beside k1 and others; allowed: the list or the single coefficients".into()));
+        }
+        [self.k1, self.k2, self.k3, self.k4] = [k1, k2, k3, k4].map(Some);
+        [self.p1, self.p2] = [p1, p2].map(Some);
+        Ok(self)
+    }
+
+    /// A frame's own keys over the shared ones. A focal length wins in whichever form it is given.
+    fn over(self, shared: &Self) -> Self {
+        let mut shared = shared.clone();
+        if self.fl_x.or(self.camera_angle_x).or(self.x_fov).is_some() {
+            [shared.fl_x, shared.camera_angle_x, shared.x_fov] = [None; 3];
+        }
+        if self.fl_y.or(self.camera_angle_y).or(self.y_fov).is_some() {
+            [shared.fl_y, shared.camera_angle_y, shared.y_fov] = [None; 3];
+        }
+        self.or(shared)
+    }
+
     /// nerfstudio's k1, k2, k3, p1, p2 are Brown's; with OPENCV_FISHEYE k1 to k4 are the fisheye's.
     fn distortion(&self, path: &Path, field: &str) -> Result<Distortion> {
         let k = [self.k1, self.k2, self.k3, self.k4, self.k5, self.k6].map(|v| v.unwrap_or(0.0));
@@ -351,24 +506,66 @@ mod tests {
     }
 
     #[test]
-    fn a_vehicle_s_box_has_a_size_and_perhaps_a_place_and_nothing_else() {
-        let known = |text: &str| Ok(one(&format!(r#""fl_x": 1, "vehicle_box": {text},"#), "")?.vehicle_box);
-        let size = [4.4, 1.8, 1.5];
-        let only: Result<_> = known(r#"{"size": [4.4, 1.8, 1.5]}"#);
-        assert_eq!(only.unwrap(), Some(VehicleBox { size, place: None }));
-        let place = Place { center: [3.0, -2.0, 0.8], yaw: 0.5 };
-        let placed: Result<_> = known(r#"{"size": [4.4, 1.8, 1.5], "center": [3, -2, 0.8], "yaw": 0.5}"#);
-        assert_eq!(placed.unwrap(), Some(VehicleBox { size, place: Some(place) }));
-        for (bad, cause) in [
-            (r#"{"size": [4.4, 1.8]}"#, "vehicle_box"),
-            (r#"{"size": [4.4, 1.8, 1500]}"#, "vehicle_box.size"),
-            (r#"{"size": [4.4, 1.8, 1.5], "yaw": 1}"#, "vehicle_box.center"),
-            (r#"{"size": [4.4, 1.8, 1.5], "center": [0, 0, 0], "yaw": 90}"#, "radians"),
-            (r#"{"size": [4.4, 1.8, 1.5], "centre": [0, 0, 0]}"#, "centre"),
+    fn a_frame_s_own_focal_length_wins_in_any_form() {
+        let c = camera(r#""fl_x": 100, "fl_y": 101,"#, r#""camera_angle_x": 1.5707963267948966,"#);
+        assert!((c.intrinsics.fx - 200.0).abs() < 1e-12 && c.intrinsics.fy == 101.0);
+        let c = camera(r#""camera_angle_x": 1,"#, r#""x_fov": 90, "y_fov": 90,"#);
+        assert!((c.intrinsics.fx - 200.0).abs() < 1e-12 && (c.intrinsics.fy - 150.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn both_ways_to_name_a_fisheye_and_to_list_its_coefficients_are_one_camera() {
+        let fisheye = Distortion::Fisheye { k: [0.1, 0.2, 0.3, 0.4] };
+        let single = r#""fl_x": 9, "k1": 0.1, "k2": 0.2, "k3": 0.3, "k4": 0.4,"#;
+        let list = r#""distortion_params": [0.1, 0.2, 0.3, 0.4, 0, 0],"#;
+        let model = r#""camera_model": "OPENCV_FISHEYE","#;
+        for (top, frame) in [
+            (format!("{single}{model}"), String::new()),
+            (format!(r#"{single}"is_fisheye": true,"#), String::new()),
+            (format!(r#"{single}{model}"is_fisheye": true,"#), String::new()),
+            (r#""is_fisheye": true, "fl_x": 9,"#.into(), list.into()),
+            (format!(r#"{list}"fl_x": 9, "is_fisheye": false,"#), r#""is_fisheye": true,"#.into()),
         ] {
-            let error = known(bad).unwrap_err().to_string();
-            assert!(error.contains(cause), "{bad}: {error}");
+            assert_eq!(camera(&top, &frame).distortion, fisheye, "{top} {frame}");
         }
+        let brown = Distortion::Brown { k: [0.1, 0.2, 0.3, 0.0, 0.0, 0.0], p: [0.5, 0.6] };
+        let list = r#""distortion_params": [0.1, 0.2, 0.3, 0, 0.5, 0.6], "fl_x": 9,"#;
+        assert_eq!(camera(list, "").distortion, brown);
+    }
+
+    #[test]
+    fn keys_with_a_meaning_that_is_not_understood_are_refused_by_name() {
+        for (top, frame, field) in [
+            (r#""is_fisheye": true, "camera_model": "OPENCV","#, "", "transforms.json: is_fisheye"),
+            (r#""is_fisheye": false, "camera_model": "OPENCV_FISHEYE","#, "", "transforms.json: is_fisheye"),
+            ("", r#""distortion_params": [0.1, 0.2, 0, 0],"#, "frames[0].distortion_params: 4 numbers"),
+            (
+                r#""distortion_params": [0,0,0,0,0,0], "k1": 0,"#,
+                "",
+                "transforms.json: distortion_params: beside",
+            ),
+            (r#""ftheta_p0": 1.5,"#, "", "transforms.json: ftheta_p0"),
+            ("", r#""equirectangular": true,"#, "frames[0].equirectangular"),
+            ("", r#""transform_matrix_end": [[1,0,0,0]],"#, "frames[0].transform_matrix_end"),
+            (r#""white_transparent": true,"#, "", "transforms.json: white_transparent"),
+            (r#""integer_depth_scale": 0,"#, "", "transforms.json: integer_depth_scale"),
+            (r#""integer_depth_scale": 1, "depth_unit_scale_factor": 2,"#, "", "integer_depth_scale: 1, but"),
+            ("", r#""depth_path": "a.png", "depth_file_path": "b.png","#, "frames[0].depth_path"),
+            (r#""n_frames": 0,"#, "", "transforms.json: n_frames: 0, but there are 1"),
+        ] {
+            let error = one(&format!(r#""fl_x": 9, {top}"#), frame).unwrap_err().to_string();
+            assert!(error.contains(field), "{top} {frame}: {error}");
+        }
+        let neutral = r#""aabb_scale": 16, "scale": 0.3, "offset": [1, 2, 3], "white_transparent": false, "n_frames": 1, "latlong": null, "fl_x": 9,"#;
+        one(neutral, r#""sharpness": 12.5,"#).unwrap();
+    }
+
+    #[test]
+    fn instant_ngp_s_names_of_depth_are_understood() {
+        let file = one(r#""fl_x": 1, "integer_depth_scale": 0.01,"#, r#""depth_path": "d\\a.png","#).unwrap();
+        assert_eq!((file.depth_unit, file.loads_depth), (Some(0.01), true));
+        assert_eq!(file.frames[0].depth_file_path.as_deref(), Some(Path::new("d/a.png")));
+        assert!(!one(r#""fl_x": 1, "enable_depth_loading": false,"#, "").unwrap().loads_depth);
     }
 
     #[test]
@@ -377,5 +574,10 @@ mod tests {
         assert_eq!(moved("[[1,0,0,0],[0,1,0,0],[0,0,1,0]]"), None);
         assert_eq!(moved("[[0,1,0,0],[1,0,0,0],[0,0,-1,0]]"), Some("applied_transform"));
         assert_eq!(one(r#""fl_x": 1, "applied_scale": 2,"#, "").unwrap().moved_by, Some("applied_scale"));
+        let by = |key: &str| one(&format!(r#""fl_x": 1, {key},"#), "").unwrap().moved_by;
+        assert_eq!(by(r#""orientation_override": "up""#), Some("orientation_override"));
+        assert_eq!(by(r#""orientation_override": "none""#), None);
+        assert_eq!(by(r#""up": [0, 1, 0]"#), Some("up"));
+        assert_eq!(by(r#""up": [0, 0, 2]"#), None);
     }
 }

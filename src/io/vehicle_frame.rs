@@ -1,7 +1,7 @@
 //! The similarity that takes a scene's own world to the vehicle's frame: as a JSON file, and from camera centres
 //! that somebody measured.
 
-use super::files::{in_file, read_limited, write_atomically};
+use super::files::{in_file, read_limited_or_piped, write_atomically};
 use super::{json, listing, select};
 use crate::error::{Error, Result};
 use crate::geometry::{RobustFit, Similarity};
@@ -14,7 +14,7 @@ const MAX_FILE: u64 = 4 << 20;
 
 /// Reads `{"vehicle_from_world": M}` or bare `M`, where M is a row-major 4x4 matrix as four rows or 16 numbers.
 pub fn read_vehicle_from_world(path: &Path) -> Result<Similarity> {
-    parse_vehicle_from_world(&read_limited(path, MAX_FILE)?, path)
+    parse_vehicle_from_world(&read_limited_or_piped(path, MAX_FILE)?, path)
 }
 
 /// The same from bytes; `path` is for messages only.
@@ -46,7 +46,7 @@ pub fn parse_vehicle_from_world(bytes: &[u8], path: &Path) -> Result<Similarity>
 
 /// Reads the same, or a plain text of 16 numbers, row-major, with blanks or commas between.
 pub fn read_matrix(path: &Path) -> Result<Similarity> {
-    parse_matrix(&read_limited(path, MAX_FILE)?, path)
+    parse_matrix(&read_limited_or_piped(path, MAX_FILE)?, path)
 }
 
 /// The same from bytes; `path` is for messages only.
@@ -119,7 +119,7 @@ pub fn alignment_text(vehicle_from_world: &Similarity, quality: Option<FitQualit
 
 /// Reads camera centres in the vehicle's frame, metres: `{"000.png": [x, y, z], ...}`.
 pub fn read_known_centers(path: &Path) -> Result<Vec<(String, DVec3)>> {
-    parse_known_centers(&read_limited(path, MAX_FILE)?, path)
+    parse_known_centers(&read_limited_or_piped(path, MAX_FILE)?, path)
 }
 
 /// The same from bytes; `path` is for messages only.

@@ -1,5 +1,6 @@
 //! Which pixels become Gaussians: vehicle, with depth, on a surface, and shown best by their own view.
 
+use super::guard::Doubt;
 use super::options::Keep;
 use super::plan::note;
 use super::report::LeftOut;
@@ -25,17 +26,21 @@ enum Verdict {
     NoDepth,
     Edge,
     Floating,
+    Stray,
+    Denied,
     Redundant,
 }
 
-/// One flag per pixel of every view; the others are counted with their reasons.
+/// One flag per pixel of every view; the others are counted with their reasons. `doubts` say why the guard took a
+/// depth out of `geometry`; they are empty where there was none.
 pub(super) fn kept(
     views: &[View],
     geometry: &Geometry,
+    doubts: &[Vec<Doubt>],
     keep: &Keep,
     left_out: &mut Vec<LeftOut>,
 ) -> Vec<Vec<bool>> {
-    let judge = Judge { views, geometry, observers: geometry.observers(views), keep };
+    let judge = Judge { views, geometry, doubts, observers: geometry.observers(views), keep };
     let verdicts: Vec<Vec<Verdict>> = (0..views.len())
         .map(|i| {
             (0..views[i].image.pixels().len()).into_par_iter().map(|pixel| judge.verdict(i, pixel)).collect()
@@ -46,6 +51,8 @@ pub(super) fn kept(
         (Verdict::NoDepth, "no depth measured"),
         (Verdict::Edge, "on the silhouette's edge, half background; the neighbours' footprints cover it"),
         (Verdict::Floating, "floating between two surfaces at a depth edge"),
+        (Verdict::Stray, "a patch of depth that hangs together with nothing else of the vehicle"),
+        (Verdict::Denied, "farther outside the vehicle in most other views' masks than poses are wrong"),
         (Verdict::Redundant, "another view shows the same surface at a higher resolution"),
     ] {
         let count = verdicts.iter().flatten().filter(|v| **v == verdict).count();
@@ -57,6 +64,7 @@ pub(super) fn kept(
 struct Judge<'a> {
     views: &'a [View],
     geometry: &'a Geometry,
+    doubts: &'a [Vec<Doubt>],
     observers: Vec<Observer<'a>>,
     keep: &'a Keep,
 }
@@ -68,7 +76,14 @@ impl Judge<'_> {
         if view.mask.as_ref().is_some_and(|m| m.labels()[pixel] != Label::Vehicle) {
             return Verdict::Outside;
         }
-        let Some(z) = depth.get(u, v) else { return Verdict::NoDepth };
+        let Some(z) = depth.get(u, v) else {
+            return match self.doubts.get(i).map_or(Doubt::None, |doubts| doubts[pixel]) {
+                Doubt::None => Verdict::NoDepth,
+                Doubt::Floating => Verdict::Floating,
+                Doubt::Stray => Verdict::Stray,
+                Doubt::Denied => Verdict::Denied,
+            };
+        };
         if !self.keep.silhouette_edge && view.mask.as_ref().is_some_and(|m| is_at_edge(m, u as i32, v as i32))
         {
             return Verdict::Edge;

@@ -8,7 +8,7 @@ use super::report::{Clock, InputError, LeftOut, Report, peak_rss_bytes};
 use super::size::VehicleSize;
 use super::spread::spread;
 use super::verdict::{self, Examined, Judged};
-use super::{baseline, cap, cost, measured, plan};
+use super::{baseline, cap, cost, guard, measured, outline, plan};
 use crate::calibrate::{self, Calibrated, Moved};
 use crate::error::{Error, Result};
 use crate::gaussians::Gaussians;
@@ -91,6 +91,8 @@ pub fn reconstruct_on<'a>(
     context.follow(cost::course(&budget::load(scene), options, context.threads()));
     let used = plan::views(scene, &options.keep, &mut left_out)?;
     let used = chosen_views(scene, used, options, &mut left_out);
+    let source = plan::prior(options.prior, used.iter().all(|&i| scene.views[i].depth.is_some()));
+    let scene = &outline::masked(scene, &used, source, &mut left_out)?;
     clock.lap("plan");
 
     context.report("undistort", 0.0)?;
@@ -128,7 +130,6 @@ pub fn reconstruct_on<'a>(
         None => cloud.clone(),
     });
     let with_depth = seen.iter().filter(|v| v.depth.is_some()).count();
-    let source = plan::prior(options.prior, with_depth == seen.len());
     let cloud = match asked {
         PriorChoice::Auto if (1..seen.len()).contains(&with_depth) => {
             warnings.push(format!(
@@ -146,6 +147,12 @@ pub fn reconstruct_on<'a>(
     let placed = known_box.map(|known| KnownBox::in_working_frame(&known, beside.is_some()));
     let prior = chosen_prior(source, cloud, placed, options)?;
     let mut geometry = prior.estimate(&views, &context)?;
+    let doubts = match source {
+        PriorChoice::Given | PriorChoice::Onnx if !options.keep.floaters => {
+            context.parallel(|| guard::doubtful(&views, &mut geometry.depths))
+        }
+        _ => Vec::new(),
+    };
     geometry.find_normals(&views, &context);
     plan::note_size(&mut left_out, known_box.is_some(), &geometry);
     warnings.extend(geometry.working_box.as_ref().and_then(WorkingBox::warning));
@@ -155,7 +162,7 @@ pub fn reconstruct_on<'a>(
     clock.lap("prior");
 
     context.report("pixels", 0.0)?;
-    let kept = context.parallel(|| pixels::kept(&views, &geometry, &options.keep, &mut left_out));
+    let kept = context.parallel(|| pixels::kept(&views, &geometry, &doubts, &options.keep, &mut left_out));
     let points = options.points.then(|| point_cloud(&seen, &geometry));
     clock.lap("pixels");
 

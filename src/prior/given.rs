@@ -20,7 +20,7 @@ impl DepthPrior for GivenDepth {
                 Error::argument(
                     format!("{}.depth", view.argument(i)),
                     "none",
-                    "metric depth for every used view, or another prior",
+                    "metric depth for every used view (of a scene on disk depth_file_path, or depth/{stem,name,stem_depth,stem.depth}.{png,npy,pfm,exr}, or the same in depths/), or another prior",
                 )
             })
         };

@@ -49,6 +49,12 @@ impl DepthMap {
         Ok(self)
     }
 
+    /// The same with no measurement where `keep` says no of a pixel's index in row order.
+    pub(crate) fn where_kept(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let kept = |(i, &d): (usize, &f32)| if keep(i) { d } else { 0.0 };
+        Self { depth: self.depth.iter().enumerate().map(kept).collect(), ..self.clone() }
+    }
+
     /// Columns.
     pub fn width(&self) -> u32 {
         self.width

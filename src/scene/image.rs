@@ -118,7 +118,7 @@ pub(crate) fn strided_rows<'a, T>(
     height: u32,
     row_stride: usize,
     elements_per_pixel: usize,
-) -> Result<impl Iterator<Item = &'a [T]> + use<'a, T>> {
+) -> Result<impl Iterator<Item = &'a [T]> + Clone + use<'a, T>> {
     if width == 0 || height == 0 {
         return Err(Error::argument(argument, format!("{width}x{height}"), "at least 1x1"));
     }

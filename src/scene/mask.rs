@@ -1,7 +1,7 @@
 //! Which pixels show the vehicle.
 
 use super::image::{check_len, strided_rows};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use std::sync::Arc;
 
 /// Mask values at or above this are vehicle.
@@ -36,7 +36,10 @@ impl Mask {
     }
 
     /// Copies from the caller's 8-bit buffer, whose rows start `row_stride` bytes apart; values of
-    /// [`VEHICLE_THRESHOLD`] and above are vehicle.
+    /// [`VEHICLE_THRESHOLD`] and above are vehicle. Where no value is above 1 it is a mask of 0 and 1, and 1 is.
+    ///
+    /// # Errors
+    /// A largest value between: such a mask was written by another rule, and by this one it would be empty.
     pub fn from_strided(
         argument: &str,
         data: &[u8],
@@ -45,7 +48,14 @@ impl Mask {
         row_stride: usize,
     ) -> Result<Self> {
         let rows = strided_rows(argument, data, width, height, row_stride, 1)?;
-        let label = |&value: &u8| if value >= VEHICLE_THRESHOLD { Label::Vehicle } else { Label::Background };
+        let largest = rows.clone().filter_map(|row| row.iter().copied().max()).max().unwrap_or(0);
+        let threshold = if largest == 1 { 1 } else { VEHICLE_THRESHOLD };
+        if (2..VEHICLE_THRESHOLD).contains(&largest) {
+            let allowed =
+                format!("0 and 255, where {VEHICLE_THRESHOLD} and above is vehicle, or 0 and 1, where 1 is");
+            return Err(Error::argument(argument, format!("largest value {largest}"), allowed));
+        }
+        let label = |&value: &u8| if value >= threshold { Label::Vehicle } else { Label::Background };
         // Row by row: an iterator over all pixels would not know its length, and is many times slower.
         let mut labels = Vec::with_capacity(width as usize * height as usize);
         rows.for_each(|row| labels.extend(row.iter().map(label)));

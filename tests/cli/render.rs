@@ -31,6 +31,32 @@ fn every_camera_gives_a_picture_named_after_its_photograph() {
 }
 
 #[test]
+fn pictures_of_one_name_in_several_folders_keep_their_folders() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = fs::read_to_string(sample().join("transforms.json")).unwrap();
+    let mut scene: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let frames = scene["frames"].as_array_mut().unwrap();
+    frames.truncate(3);
+    for (frame, path) in
+        frames.iter_mut().zip(["images/cam0/000.png", "images/cam1/000.png", "images/a,b.png"])
+    {
+        frame["file_path"] = path.into();
+        (frame["w"], frame["h"]) = (512.into(), 384.into());
+    }
+    fs::write(folder.path().join("transforms.json"), scene.to_string()).unwrap();
+    let render = |views: &str, out: &str| {
+        let words = format!("render {} --cameras {{}} {views} --depth -o {{}}/{out}", asset().display());
+        succeed(folder.path(), &words);
+    };
+    render("", "all");
+    for name in ["cam0/000.png", "cam1/000.png", "a,b.png", "depth/cam0/000.png", "depth/cam1/000.png"] {
+        assert!(folder.path().join("all").join(name).is_file(), "{name}");
+    }
+    render(r"--views cam1/000.png --views a\,b", "some");
+    assert_eq!(names(&folder.path().join("some")), ["000.png", "a,b.png", "depth"]);
+}
+
+#[test]
 fn depth_is_16_bit_millimetres_beside_the_pictures() {
     let folder = tempfile::tempdir().unwrap();
     succeed(folder.path(), &format!("render {} --cameras . --views 002 --depth -o {{}}", asset().display()));

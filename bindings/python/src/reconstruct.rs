@@ -17,7 +17,6 @@ use vg::progress::Progress;
 use vg::refine::{Amount, RefineOptions};
 use vg::relight::Relight;
 use vg::scene::image::PixelFormat;
-use vg::scene::mask::VEHICLE_THRESHOLD;
 use vg::scene::{Cloud, DepthMap, Mask, Place, RgbImage};
 use vg::symmetry::SymmetryMode;
 use vg::{Scene, View};
@@ -223,8 +222,8 @@ pub(crate) fn picture(
 
 pub(crate) fn mask(object: &Bound<'_, PyAny>, argument: &str, camera: &vg::Camera) -> PyResult<Mask> {
     let py = object.py();
-    let allowed = "a NumPy array of bool, or of uint8 where 128 and above is vehicle, (height, width); others become one \
-                   by a comparison: mask > 0.5";
+    let allowed = "a NumPy array of bool, or of uint8 where 128 and above is vehicle, or 1 of 0 and 1, (height, width); \
+                   others become one by a comparison: mask > 0.5";
     // Of one byte each, 0 or 1.
     let is_bool = object.cast::<PyUntypedArray>().is_ok_and(|a| numpy_is_bool(py, a));
     let labels: Vec<u8>;
@@ -238,13 +237,6 @@ pub(crate) fn mask(object: &Bound<'_, PyAny>, argument: &str, camera: &vg::Camer
         (bytes.shape().to_vec(), values(&bytes)?)
     };
     same_size(py, argument, &shape, camera)?;
-    let largest = data.iter().copied().max().unwrap_or(0);
-    if (1..VEHICLE_THRESHOLD).contains(&largest) {
-        let text = format!(
-            "{argument}: the largest value is {largest}, and vehicle begins at {VEHICLE_THRESHOLD}: the mask is empty"
-        );
-        warn(py, &text)?;
-    }
     Mask::from_strided(argument, data, camera.width, camera.height, camera.width as usize)
         .map_err(|e| from_library(py, e))
 }

@@ -119,12 +119,13 @@ def test_masks_may_be_bool_or_bytes_or_the_alpha_channel(ellipsoid: Views, made:
     assert same_bytes(masked.gaussians, plain.gaussians)
 
 
-def test_a_mask_of_zeros_and_ones_is_a_warning(ellipsoid: Views) -> None:
+def test_a_mask_of_zeros_and_ones_is_read_as_one(ellipsoid: Views, made: vg.Reconstruction) -> None:
     ones = [mask.astype(np.uint8) for mask in ellipsoid.masks]
-    with pytest.warns(UserWarning, match=r"masks\[0\]: the largest value is 1, and vehicle begins at 128") as caught:
-        with pytest.raises(vg.VgError, match="every mask is empty"):
-            vg.reconstruct(ellipsoid.images[:1], ones[:1], ellipsoid.cameras[:1])
-    assert caught[0].filename == __file__
+    again = vg.reconstruct(ellipsoid.images, ones, ellipsoid.cameras, ellipsoid.depths)
+    assert same_bytes(again.gaussians, made.gaussians)
+    twos = [2 * mask for mask in ones]
+    with pytest.raises(vg.VgError, match=r"^masks\[0\]: largest value 2; allowed: 0 and 255, where 128 and above"):
+        vg.reconstruct(ellipsoid.images, twos, ellipsoid.cameras, ellipsoid.depths)
 
 
 def test_options_reach_the_library(ellipsoid: Views) -> None:

@@ -55,8 +55,13 @@ def test_a_colmap_model_needs_the_similarity_and_takes_it_as_a_file_or_a_matrix(
 
 def test_what_looks_like_a_mistake_is_a_warning(tmp_path: Path) -> None:
     shutil.copytree(SEDAN, tmp_path / "car")
-    Image.fromarray(np.eye(384, 512, dtype=np.uint8)).save(tmp_path / "car" / "masks" / "000.png")
-    with pytest.warns(UserWarning, match="the largest value is 1, and vehicle begins at 128") as caught:
+    file = tmp_path / "car" / "transforms.json"
+    scene = json.loads(file.read_text())
+    for frame in scene["frames"]:
+        del frame["mask_path"]
+    file.write_text(json.dumps(scene))
+    shutil.rmtree(tmp_path / "car" / "masks")
+    with pytest.warns(UserWarning, match=r"no view has a mask: looked for masks/\{000,000.png,000_mask") as caught:
         vg.open_scene(tmp_path / "car", "000")
     assert caught[0].filename == __file__
 

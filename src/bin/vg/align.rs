@@ -4,7 +4,7 @@
 use crate::args::{AlignArgs, Mode};
 use crate::files::{Kind, Results};
 use crate::guard::Inputs;
-use crate::job::{Failure, Outcome, Result};
+use crate::job::{self, Failure, Outcome, Result};
 use crate::{files, shown};
 use std::fmt::Write;
 use std::path::Path;
@@ -22,6 +22,8 @@ struct Found {
     vehicle_from_world: Similarity,
     quality: Option<FitQuality>,
     lines: Vec<String>,
+    /// What the caller should look at.
+    notes: Vec<String>,
 }
 
 /// Finds, writes, and says how well it fits.
@@ -51,6 +53,7 @@ pub(crate) fn run(args: &AlignArgs) -> Result {
     if let Some(quality) = found.quality {
         let _ = write!(text, ", residual {:.4} m, confidence {:.2}", quality.residual_m, quality.confidence);
     }
+    found.notes.iter().for_each(|note| job::note(note));
     found.lines.iter().for_each(|line| {
         let _ = write!(text, "\n  {}", shown::line(line));
     });
@@ -80,7 +83,8 @@ fn by_scan(args: &AlignArgs, path: &Path) -> Result<Found> {
     ));
     lines.push(format!("{} sparse points lie on the scan, to {:.4} m", found.points, found.points_m));
     let quality = FitQuality { residual_m: found.residual_m, confidence: found.confidence };
-    Ok(Found { vehicle_from_world: found.vehicle_from_world, quality: Some(quality), lines })
+    let notes = scene.notes;
+    Ok(Found { vehicle_from_world: found.vehicle_from_world, quality: Some(quality), lines, notes })
 }
 
 fn by_box(args: &AlignArgs, size: [f64; 3]) -> Result<Found> {
@@ -94,7 +98,8 @@ fn by_box(args: &AlignArgs, size: [f64; 3]) -> Result<Found> {
         format!("front from {}", found.asked_view),
     ];
     let quality = FitQuality { residual_m: found.residual_m, confidence: found.confidence };
-    Ok(Found { vehicle_from_world: found.vehicle_from_world, quality: Some(quality), lines })
+    let notes = scene.notes;
+    Ok(Found { vehicle_from_world: found.vehicle_from_world, quality: Some(quality), lines, notes })
 }
 
 fn by_centers(args: &AlignArgs, path: &Path) -> Result<Found> {
@@ -112,7 +117,8 @@ fn by_centers(args: &AlignArgs, path: &Path) -> Result<Found> {
     };
     let quality = FitQuality { residual_m: alignment.residual(), confidence: alignment.confidence() };
     let lines = pairs.map(line).collect();
-    Ok(Found { vehicle_from_world: alignment.similarity, quality: Some(quality), lines })
+    let vehicle_from_world = alignment.similarity;
+    Ok(Found { vehicle_from_world, quality: Some(quality), lines, notes: Vec::new() })
 }
 
 fn by_matrix(args: &AlignArgs, path: &Path) -> Result<Found> {
@@ -120,7 +126,7 @@ fn by_matrix(args: &AlignArgs, path: &Path) -> Result<Found> {
     let options = io::SceneOptions { vehicle_from_world: Some(io::read_matrix(path)?), ..Default::default() };
     io::list_scene(&args.scene, &options)?;
     let vehicle_from_world = options.vehicle_from_world.unwrap_or(Similarity::IDENTITY);
-    Ok(Found { vehicle_from_world, quality: None, lines: Vec::new() })
+    Ok(Found { vehicle_from_world, quality: None, lines: Vec::new(), notes: Vec::new() })
 }
 
 fn masks_line(used: usize, scene: &MaskedViews) -> String {

@@ -27,8 +27,8 @@ pub(crate) fn run(args: &DemoArgs) -> Result {
 
     let splits = split::read(&scene_folder.join("split.json"), None)?;
     let split = splits.into_values().next().ok_or_else(|| Failure::job("the sample has no split"))?;
-    let pictures: Vec<PathBuf> =
-        split.test.iter().map(|name| unseen.join(render::picture_name(name))).collect();
+    let names = render::picture_names(split.test.iter().map(String::as_str));
+    let pictures: Vec<PathBuf> = names.iter().map(|name| unseen.join(name)).collect();
     guard::refuse_clashes(&pictures, &Inputs::default().scene(&scene_folder))?;
     files::prepare_folder(&unseen)?;
     // Photographs, masks and cameras are all this gets; the sample's depth is for the comparison below.
@@ -48,8 +48,8 @@ pub(crate) fn run(args: &DemoArgs) -> Result {
     }
     files::write_json(&report, &made.report)?;
     let white = RenderOptions::default().background;
-    for (view, picture) in tests.scene.views.iter().zip(&drawn) {
-        render::write(&unseen.join(render::picture_name(&view.name)), picture, white)?;
+    for (path, picture) in pictures.iter().zip(&drawn) {
+        render::write(path, picture, white)?;
     }
     let rows = [
         inputs.scene.views.iter().map(photograph).collect(),

@@ -25,7 +25,7 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
         options.vehicle_from_world =
             Some(vehicle_frame::parse_matrix(frame.as_bytes(), Path::new("--frame-matrix"))?);
     }
-    let index = io::list_scene(&args.scene, &scene::named(args.views.views.as_deref(), &options))?;
+    let index = io::list_scene(&args.scene, &scene::named(args.views.names().as_deref(), &options))?;
     let results = Results::new([
         (Kind::Ply, Some(&args.output)),
         (Kind::Ply, args.points.as_ref()),

@@ -22,7 +22,7 @@ struct Document<'a> {
 /// Opens, refines, writes.
 pub(crate) fn run(args: &RefineArgs) -> Result {
     let options = scene::options(&args.frame, None, false)?;
-    let index = io::list_scene(&args.scene, &scene::named(args.views.views.as_deref(), &options))?;
+    let index = io::list_scene(&args.scene, &scene::named(args.views.names().as_deref(), &options))?;
     let results = Results::new([(Kind::Ply, Some(&args.output)), (Kind::Json, args.report.as_ref())]);
     let inputs = Inputs::default().files(&scene::files_of(&index)).files([&args.asset]);
     results.prepare(&inputs.files(&args.frame.vehicle_from_world).scene(&args.scene))?;

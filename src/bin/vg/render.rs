@@ -6,6 +6,7 @@ use crate::job::{self, Failure, Outcome, Result};
 use crate::shown::{self, Bar};
 use crate::{files, info, scene};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use vg::geometry::Turntable;
@@ -23,23 +24,24 @@ pub(crate) fn run(args: &RenderArgs) -> Result {
         (Some(path), _) => {
             // The cameras alone: neither pictures nor depth need exist.
             let options = scene::options(&args.frame, None, true)?;
-            let index = io::list_scene(path, &scene::named(args.views.views.as_deref(), &options))?;
+            let index = io::list_scene(path, &scene::named(args.views.names().as_deref(), &options))?;
             inputs = inputs.files(&scene::files_of(&index)).scene(path);
+            index.notes.iter().for_each(|note| job::note(note));
             index.cameras()
         }
         (None, n) => turntable(&gaussians, n.unwrap_or(1), args.size)?,
     };
-    let pictures: Vec<PathBuf> = cameras.iter().map(|c| args.output.join(picture_name(&c.name))).collect();
-    let depth_folder = args.output.join("depth");
+    let names = picture_names(cameras.iter().map(|c| c.name.as_str()));
+    let pictures: Vec<PathBuf> = names.iter().map(|name| args.output.join(name)).collect();
     let depths: Vec<PathBuf> = match args.depth {
-        true => cameras.iter().map(|c| depth_folder.join(picture_name(&c.name))).collect(),
+        true => names.iter().map(|name| args.output.join("depth").join(name)).collect(),
         false => Vec::new(),
     };
-    guard::refuse_clashes(&[pictures.as_slice(), &depths].concat(), &inputs)?;
+    let outputs = [pictures.as_slice(), &depths].concat();
+    guard::refuse_clashes(&outputs, &inputs)?;
     files::prepare_folder(&args.output)?;
-    if args.depth {
-        files::prepare_folder(&depth_folder)?;
-    }
+    let folders: BTreeSet<&Path> = outputs.iter().filter_map(|output| output.parent()).collect();
+    folders.into_iter().try_for_each(files::prepare_folder)?;
 
     let options = RenderOptions { background: args.background, ..RenderOptions::default() };
     let threads = Threads::new(args.threads)?;
@@ -102,10 +104,23 @@ pub(crate) fn write(path: &Path, drawn: &Rendered, background: Background) -> vg
     }
 }
 
-/// `<image stem>.png`, without the folders of the picture's name.
-pub(crate) fn picture_name(name: &str) -> String {
-    let stem = Path::new(name).file_stem().unwrap_or(name.as_ref());
-    format!("{}.png", stem.to_string_lossy())
+/// `<image stem>.png` for each picture's name; where two would be one, all with the folders of their names, and where
+/// that does not tell them apart either, with their extensions too.
+pub(crate) fn picture_names<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Vec<PathBuf> {
+    let png = |path: &Path| {
+        let mut longer = path.as_os_str().to_owned();
+        longer.push(".png");
+        PathBuf::from(longer)
+    };
+    let stem = |name: &str| Path::new(name).with_extension("");
+    let file_name = |path: PathBuf| path.file_name().map(PathBuf::from).unwrap_or(path);
+    let ways: [&dyn Fn(&str) -> PathBuf; 3] =
+        [&|name| png(&file_name(stem(name))), &|name| png(&stem(name)), &|name| png(Path::new(name))];
+    let named = |way: &dyn Fn(&str) -> PathBuf| -> Vec<PathBuf> { names.clone().map(way).collect() };
+    let are_distinct = |paths: &[PathBuf]| paths.iter().collect::<BTreeSet<_>>().len() == paths.len();
+    let all = ways.map(named);
+    let [short, ..] = &all;
+    all.iter().find(|paths| are_distinct(paths)).unwrap_or(short).clone()
 }
 
 /// `n` cameras on a circle around the middle of the model, named by their numbers.

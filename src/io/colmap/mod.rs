@@ -8,5 +8,6 @@ mod model;
 mod text;
 
 pub use binary::{cameras_from_binary, images_from_binary, points_from_binary};
+pub(super) use model::{Found, find};
 pub use model::{Model, ModelCamera, ModelImage, SparsePoints, find_model, read_model, read_points};
 pub use text::{cameras_from_text, images_from_text, points_from_text};

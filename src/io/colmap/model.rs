@@ -5,8 +5,9 @@ use crate::error::{Error, Result};
 use crate::geometry::camera::MAX_SIDE;
 use crate::geometry::frame::pose_from_colmap;
 use crate::geometry::{Camera, CameraModel, Pose};
-use crate::io::files::{in_file, read_limited, relative_inside};
+use crate::io::files::{in_file, is_there, open_regular, read_limited, relative_inside};
 use std::collections::{HashMap, HashSet};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Longest model file that is read; an image with ten thousand features takes 240 kB.
@@ -71,10 +72,76 @@ const OTHER_MODELS: [&str; 11] = [
     "EQUIRECTANGULAR",
 ];
 
-/// The model's folder at or below `folder`: `sparse/0`, `sparse`, `folder` itself, or `0`.
+/// The model's folder at or below `folder`: `sparse/0`, `sparse`, `folder` itself, or `0`. Of several numbered models
+/// it is the one with the most images: COLMAP writes one for each part of a scene that it could not join.
 pub fn find_model(folder: &Path) -> Option<PathBuf> {
-    let candidates = [folder.join("sparse/0"), folder.join("sparse"), folder.to_owned(), folder.join("0")];
-    candidates.into_iter().find(|dir| extension_of(dir).is_some())
+    find(folder).map(|found| found.folder)
+}
+
+/// A model that was found.
+pub(crate) struct Found {
+    pub(crate) folder: PathBuf,
+    /// Which of several it is.
+    pub(crate) note: Option<String>,
+}
+
+/// As [`find_model`].
+pub(crate) fn find(folder: &Path) -> Option<Found> {
+    let plain = |folder: PathBuf| extension_of(&folder).is_some().then_some(Found { folder, note: None });
+    let sparse = folder.join("sparse");
+    largest(&sparse)
+        .or_else(|| plain(sparse))
+        .or_else(|| plain(folder.to_owned()))
+        .or_else(|| largest(folder))
+}
+
+/// The model with the most images of those in numbered folders, the first of equals.
+fn largest(folder: &Path) -> Option<Found> {
+    let mut numbered: Vec<(u32, PathBuf)> = std::fs::read_dir(folder)
+        .into_iter()
+        .flatten()
+        .filter_map(|entry| {
+            let path = entry.ok()?.path();
+            Some((path.file_name()?.to_str()?.parse().ok()?, path))
+        })
+        .filter(|(_, path)| extension_of(path).is_some())
+        .collect();
+    numbered.sort();
+    if numbered.len() < 2 {
+        return numbered.pop().map(|(_, folder)| Found { folder, note: None });
+    }
+    let mut models: Vec<(usize, PathBuf)> =
+        numbered.into_iter().map(|(_, path)| (image_count(&path), path)).collect();
+    models.sort_by_key(|(images, _)| std::cmp::Reverse(*images));
+    let folder = models[0].1.clone();
+    let others: Vec<String> =
+        models[1..].iter().map(|(images, path)| format!("{} has {images}", path.display())).collect();
+    let note = format!(
+        "{}: taken of {} COLMAP models, with {} images; {}",
+        folder.display(),
+        models.len(),
+        models[0].0,
+        others.join(", ")
+    );
+    Some(Found { folder, note: Some(note) })
+}
+
+/// How many images a model says it has; 0 where it cannot be read, which reading it says better.
+fn image_count(folder: &Path) -> usize {
+    let binary = folder.join("images.bin");
+    let counted = match extension_of(folder) {
+        Some("bin") => open_regular(&binary).ok().and_then(|mut file| {
+            let mut count = [0; 8];
+            file.read_exact(&mut count).ok()?;
+            usize::try_from(u64::from_le_bytes(count)).ok()
+        }),
+        _ => {
+            let path = folder.join("images.txt");
+            let bytes = read_limited(&path, MAX_FILE).ok();
+            bytes.and_then(|bytes| text::images_from_text(&bytes, &path).ok()).map(|images| images.len())
+        }
+    };
+    counted.unwrap_or(0)
 }
 
 /// Reads `cameras` and `images` of the model in `folder`, the binary files where there are both kinds.
@@ -100,9 +167,9 @@ pub fn read_model(folder: &Path) -> Result<Model> {
 /// Reads the sparse points of the model in `folder`, or `None` where it has no file of them.
 pub fn read_points(folder: &Path) -> Result<Option<SparsePoints>> {
     let (binary, text) = (folder.join("points3D.bin"), folder.join("points3D.txt"));
-    if binary.is_file() {
+    if is_there(&binary) {
         binary::points_from_binary(&read_limited(&binary, MAX_FILE)?, &binary).map(Some)
-    } else if text.is_file() {
+    } else if is_there(&text) {
         text::points_from_text(&read_limited(&text, MAX_FILE)?, &text).map(Some)
     } else {
         Ok(None)
@@ -111,7 +178,7 @@ pub fn read_points(folder: &Path) -> Result<Option<SparsePoints>> {
 
 fn extension_of(folder: &Path) -> Option<&'static str> {
     ["bin", "txt"].into_iter().find(|extension| {
-        ["cameras", "images"].iter().all(|file| folder.join(format!("{file}.{extension}")).is_file())
+        ["cameras", "images"].iter().all(|file| is_there(&folder.join(format!("{file}.{extension}"))))
     })
 }
 

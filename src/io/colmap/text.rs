@@ -45,12 +45,8 @@ pub fn images_from_text(bytes: &[u8], path: &Path) -> Result<Vec<ModelImage>> {
         let [qw, qx, qy, qz, tx, ty, tz] = pose;
         let image = ModelImage::new(id, [qw, qx, qy, qz], [tx, ty, tz], camera_id, name.as_bytes(), path)?;
         images.push(image);
-        // A model whose empty lines somebody removed would lose every second image.
-        if let Some(features) = lines.next()
-            && features.words()?.rest.split_ascii_whitespace().count() % 3 != 0
-        {
-            let reason = "not POINTS2D as triples X Y POINT3D_ID; allowed: those, or an empty line";
-            return Err(features.error(reason));
+        if let Some(features) = lines.next() {
+            features.check_features()?;
         }
     }
     Ok(images)
@@ -90,6 +86,22 @@ impl<'a> Line<'a> {
     fn words(&self) -> Result<Words<'a>> {
         let rest = std::str::from_utf8(self.bytes).map_err(|_| self.error("not UTF-8; allowed: UTF-8"))?;
         Ok(Words { rest, number: self.number, path: self.path })
+    }
+
+    /// Whether these are features, triples of X Y POINT3D_ID. A model whose empty lines were removed has the next image
+    /// here, which would be lost.
+    fn check_features(&self) -> Result<()> {
+        let mut words = self.words()?.rest.split_ascii_whitespace();
+        while let Some(x) = words.next() {
+            let is_feature = x.parse::<f64>().is_ok()
+                && words.next().is_some_and(|y| y.parse::<f64>().is_ok())
+                && words.next().is_some_and(|id| id.parse::<i128>().is_ok());
+            if !is_feature {
+                let reason = "not POINTS2D as triples X Y POINT3D_ID; allowed: those, or an empty line";
+                return Err(self.error(reason));
+            }
+        }
+        Ok(())
     }
 
     fn error(&self, reason: &str) -> Error {

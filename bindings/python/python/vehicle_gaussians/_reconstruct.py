@@ -79,7 +79,7 @@ def reconstruct(
     """Reconstructs the vehicle that the photographs show.
 
     images: RGB, uint8 (height, width, 3); with a fourth channel, alpha is the mask where none is given.
-    masks: (height, width), bool or uint8 where 128 and above is vehicle; None where nobody said.
+    masks: (height, width), bool or uint8 where 128 and above is vehicle, or 1 of 0 and 1; None where there is none.
     cameras: one per image, posed in the vehicle's frame (x forward, y left, z up, metres; y = 0 is the plane of
     symmetry).
     depths: floats (height, width), metres along the optical axis, 0 for none.

@@ -13,7 +13,7 @@ pub(crate) use report::ReportArgs;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
-use values::{backend, background, picture_size, positive, refinement};
+use values::{Names, backend, background, names, picture_size, positive, refinement};
 use vg::refine::Amount;
 use vg::render::{Backend, Background};
 
@@ -62,9 +62,18 @@ pub(crate) struct FrameArgs {
 /// Which of the scene's views.
 #[derive(Args)]
 pub(crate) struct ViewsArgs {
-    /// Views to use, by path, file name, or file name without extension; all if not given
-    #[arg(long, value_name = "NAME,NAME,...", value_delimiter = ',')]
-    pub(crate) views: Option<Vec<String>>,
+    /// Views to use, by path, file name, or file name without extension; all if not given. May be repeated; a comma
+    /// inside a name is written \,
+    #[arg(long, value_name = "NAME,NAME,...", value_parser = names)]
+    views: Option<Vec<Names>>,
+}
+
+impl ViewsArgs {
+    /// The names in the order given; `None` means all views.
+    pub(crate) fn names(&self) -> Option<Vec<String>> {
+        let lists = self.views.as_ref()?;
+        Some(lists.iter().flat_map(|list| list.0.iter().cloned()).collect())
+    }
 }
 
 /// Numbers in depth files.
@@ -175,7 +184,8 @@ pub(crate) struct RefineArgs {
 pub(crate) struct RenderArgs {
     /// The model, a PLY file in 3DGS's layout
     pub(crate) asset: PathBuf,
-    /// Draw what the cameras of this scene see: <image stem>.png each
+    /// Draw what the cameras of this scene see: <image stem>.png each, with the folders of the pictures' names where
+    /// two would be called the same
     #[arg(long, value_name = "SCENE")]
     pub(crate) cameras: Option<PathBuf>,
     #[command(flatten)]
@@ -191,7 +201,7 @@ pub(crate) struct RenderArgs {
     /// What is behind the vehicle; a colour as three numbers from 0 to 255
     #[arg(long, value_name = "white|black|R,G,B|transparent", default_value = "white", value_parser = background)]
     pub(crate) background: Background,
-    /// Write depth too: DIR/depth/<image stem>.png, 16-bit millimetres, 0 = none
+    /// Write depth too, under the same names in DIR/depth: 16-bit millimetres, 0 = none
     #[arg(long)]
     pub(crate) depth: bool,
     /// Who draws: the CPU, a graphics processor, or what is best of what this build and this machine have

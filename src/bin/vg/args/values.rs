@@ -41,6 +41,33 @@ pub(super) fn known_box(text: &str) -> Result<KnownBox, String> {
     }
 }
 
+/// Names with commas between; `\,` is a comma inside a name. A type of its own: the parser would take a list for one of
+/// values.
+#[derive(Clone)]
+pub(super) struct Names(pub(super) Vec<String>);
+
+pub(super) fn names(text: &str) -> Result<Names, String> {
+    let mut names = vec![String::new()];
+    let mut rest = text;
+    while let Some(at) = rest.find(',') {
+        let (before, after) = (&rest[..at], &rest[at + 1..]);
+        let last = names.last_mut().ok_or("expected a name")?;
+        match before.strip_suffix('\\') {
+            Some(before) => last.extend([before, ","]),
+            None => {
+                last.push_str(before);
+                names.push(String::new());
+            }
+        }
+        rest = after;
+    }
+    names.last_mut().ok_or("expected a name")?.push_str(rest);
+    match names.iter().any(String::is_empty) {
+        true => Err("expected names with commas between, and \\, for a comma inside a name".into()),
+        false => Ok(Names(names)),
+    }
+}
+
 pub(super) fn background(text: &str) -> Result<Background, String> {
     match text {
         "white" => Ok(Background::Color([1.0; 3])),
@@ -102,4 +129,20 @@ pub(super) fn share(text: &str) -> Result<f64, String> {
 
 pub(super) fn at_least_one(text: &str) -> Result<usize, String> {
     text.parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above 0".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commas_divide_names_unless_they_are_escaped() {
+        let read = |text: &str| names(text).map(|n| n.0);
+        assert_eq!(read("a.png,b").unwrap(), ["a.png", "b"]);
+        assert_eq!(read(r"a\,b.png,c\d").unwrap(), ["a,b.png", r"c\d"]);
+        assert_eq!(read(r"\,").unwrap(), [","]);
+        for bad in ["", "a,,b", "a,"] {
+            assert!(read(bad).is_err(), "{bad}");
+        }
+    }
 }

@@ -86,8 +86,8 @@ impl Chosen {
             let how = format!("{why}: the model is compared only with the photographs it was made from.");
             Ok(Self { inputs, tests: Vec::new(), how, file: None })
         };
-        if let Some(names) = &args.views.views {
-            return alone(Some(names.clone()), "The views were chosen by --views");
+        if let Some(names) = args.views.names() {
+            return alone(Some(names), "The views were chosen by --views");
         }
         let named = args.split.as_deref().unwrap_or(Path::new("split.json"));
         let file = split::find(named, &args.scene);
