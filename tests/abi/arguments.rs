@@ -439,8 +439,11 @@ fn numbers_that_overflow_are_refused_and_not_handed_out() {
     table.row(calls::pose_from_opencv, "far, then scaled", tvec, refused("pose"));
     let turned = |call: &mut Call| call.doubles("rvec").fill(far);
     table.row(calls::pose_from_opencv, "no angle", turned, refused("rvec"));
-    let depth = |call: &mut Call| call.set("depth_m", Value::Number(far.to_bits()));
-    table.row(calls::camera_unproject, "beyond all numbers", depth, refused("pixel"));
+    let beyond = |call: &mut Call| {
+        call.set("depth_m", Value::Number(far.to_bits()));
+        call.doubles("pixel")[0] = 1e300;
+    };
+    table.row(calls::camera_unproject, "beyond all numbers", beyond, refused("pixel"));
 
     // A float32 of 16 km does not resolve a millimetre.
     let utm = |call: &mut Call| call.doubles("to_from_vehicle")[3] = 5e6;
@@ -473,7 +476,7 @@ fn points_without_a_pixel_and_pixels_without_a_point_are_nan_between_the_others(
     call.set("points", Value::Doubles(given.concat()));
     call.set("count", Value::Number(4));
     // Room that holds no finite numbers is not the table's kind of argument.
-    let (mut pixels, mut depths) = ([7.0; 8], [7.0; 4]);
+    let (mut pixels, mut depths) = ([7.0f64; 8], [7.0f64; 4]);
     call.set("out_pixels", Value::Handle(pixels.as_mut_ptr().expose_provenance()));
     call.set("out_depths", Value::Handle(depths.as_mut_ptr().expose_provenance()));
     assert!(call.run(true).is_ok());
@@ -485,7 +488,7 @@ fn points_without_a_pixel_and_pixels_without_a_point_are_nan_between_the_others(
     call.set("pixels", Value::Doubles(pixels.to_vec()));
     call.set("depths", Value::Doubles(depths.to_vec()));
     call.set("count", Value::Number(4));
-    let mut points = [7.0; 12];
+    let mut points = [7.0f64; 12];
     call.set("out_points", Value::Handle(points.as_mut_ptr().expose_provenance()));
     assert!(call.run(true).is_ok());
     assert!(points[3..9].iter().all(|v| v.is_nan()));
