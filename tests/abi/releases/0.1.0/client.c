@@ -464,22 +464,24 @@ static void refine(const vg_gaussians *car, const vg_view *views, size_t count, 
     CHECK(options.iterations == 300 && options.seconds == 0 && options.hold_out == 0 && options.densify == 0);
     CHECK(options.backend == VG_BACKEND_AUTO && options.progress == NULL && options.progress_user == NULL);
     options.context = context;
-    options.iterations = quick ? 1 : 8;
+    options.iterations = 8;
     options.hold_out = 1;
     options.progress = on_progress;
     options.progress_user = &heard;
     CHECK(vg_refinement_init(&done, sizeof done) == VG_STATUS_OK && isnan(done.psnr_after_db));
-    DO(vg_refine(car, views, count, &options, &better, &done, &error));
-    CHECK(vg_gaussians_count(better) == vg_gaussians_count(car) && heard.calls > 0 && heard.last_fraction <= 1);
-    CHECK(done.iterations == options.iterations && done.made == done.iterations && done.kept <= done.made);
-    CHECK(done.stop == VG_REFINE_STOP_DONE && done.psnr_after_db >= 15 && done.psnr_before_db >= 15);
-    CHECK(done.held_out_before_db >= 15 && done.held_out_after_db >= done.held_out_before_db);
-    vg_gaussians_free(better);
+    if (!quick) {
+        DO(vg_refine(car, views, count, &options, &better, &done, &error));
+        CHECK(vg_gaussians_count(better) == vg_gaussians_count(car) && heard.calls > 0 && heard.last_fraction <= 1);
+        CHECK(done.iterations == options.iterations && done.made == done.iterations && done.kept <= done.made);
+        CHECK(done.stop == VG_REFINE_STOP_DONE && done.psnr_after_db >= 15 && done.psnr_before_db >= 15);
+        CHECK(done.held_out_before_db >= 15 && done.held_out_after_db >= done.held_out_before_db);
+        vg_gaussians_free(better);
 
-    heard.calls = 0;
-    heard.stop_after = 1;
-    FAILS(vg_refine(car, views, count, &options, &better, NULL, &error), VG_STATUS_CANCELLED, "refine");
-    CHECK(better == NULL);
+        heard.calls = 0;
+        heard.stop_after = 1;
+        FAILS(vg_refine(car, views, count, &options, &better, NULL, &error), VG_STATUS_CANCELLED, "refine");
+        CHECK(better == NULL);
+    }
     options.iterations = 1000001;
     FAILS(vg_refine(car, views, count, &options, &better, &done, &error), VG_STATUS_ARGUMENT, "options.iterations");
 }
