@@ -31,7 +31,7 @@
  * Images.    8-bit channels are sRGB-encoded and stay so; nothing is linearised. Any row stride, any alignment. The
  *            library reads them during the call and neither changes nor keeps them.
  *
- * Masks.     One byte a pixel: 128 and above is vehicle. See vg_view for what no mask means.
+ * Masks.     One byte a pixel: 128 and above is vehicle, or 1 of 0 and 1. See vg_view for what no mask means.
  *
  * Depth.     float32, planar, along the optical axis, metres. 0, negative, NaN and infinite mean no measurement.
  *
@@ -55,15 +55,25 @@
  * NULL.      Allowed where a comment says what it means; everywhere else it is an error, never a crash.
  *
  * Threads.   Handles never change after they are made. Any number of threads may use one handle at a time, a
- *            vg_context too; only its _free must come last. The library starts threads of its own, in a context or
- *            for the length of a call, and ends them with it; it has no other state, and does not touch signal
- *            handlers, the locale, standard output or standard error. Callbacks come on the calling thread. After
- *            fork, the child must not use a context of the parent.
+ *            vg_context too; only its _free must come last. Worker threads belong to a context and end with it; a
+ *            context of one thread has none and works on the calling thread, which needs 1 MiB of stack. Calls that
+ *            name no context share one of the process, with a thread per core, which the first of them makes and
+ *            vg_default_context_free ends. Where the system starts no thread, that is VG_STATUS_THREADS. Worker
+ *            threads block signals, so that handlers run on the host's threads. The library has no other state, and
+ *            does not touch signal handlers, errno, the locale, standard output or standard error. Callbacks come on
+ *            the calling thread.
+ *
+ * Forks.     In the child, a context or vg_model of the parent is VG_STATUS_ARGUMENT, and freeing it does nothing;
+ *            Gaussians, scenes, reports, and calls that name no context, work as they did. A vg_renderer that draws
+ *            on a graphics processor must not be used there.
+ *
+ * Unloading. dlclose is allowed once no call is running, but the code stays in memory: threads that called the
+ *            library run destructors of it when they end. The library is linked with -z nodelete, and so must be a
+ *            shared object that is linked with libvg.a, unless it is never unloaded.
  *
  * Networks.  vg_model_open loads ONNX Runtime, a shared library, when the first model is opened and not before; it
- *            stays loaded until the process ends, and libvg must then not be unloaded either. A vg_model is a
- *            handle like the others; its threads are the runtime's own. After fork, the child must not use a model
- *            of the parent.
+ *            stays loaded until the process ends. A vg_model is a handle like the others; its threads are the
+ *            runtime's own.
  *
  * Errors.    Functions that can fail return a vg_status and, through out_error, an object with a message: which
  *            argument, what was found, what is allowed. On failure, out handles are NULL, and everything the caller
@@ -163,6 +173,10 @@ enum vg_status
      * What was asked for needs something that this machine does not have: ONNX Runtime, a device.
      */
     VG_STATUS_MISSING = 8,
+    /**
+     * The operating system did not start the threads that were asked for.
+     */
+    VG_STATUS_THREADS = 9,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -326,7 +340,8 @@ enum vg_prior
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * `VG_PRIOR_GIVEN` if every used view has depth, else `VG_PRIOR_SHAPE`.
+     * `VG_PRIOR_GIVEN` if every used view has depth, else `VG_PRIOR_SHAPE`. Where some views have depth, it counts as
+     * measured points, to which the shape bends, and `log` is told.
      */
     VG_PRIOR_AUTO = 0,
     /**
@@ -599,6 +614,39 @@ typedef int32_t vg_refine_stop;
 #endif // __cplusplus
 
 /**
+ * Whether a reconstruction is to be believed.
+ */
+enum vg_verdict
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Nothing looks wrong.
+     */
+    VG_VERDICT_GOOD = 0,
+    /**
+     * Nothing looks wrong, but `vg_options.check` was 0: views were not compared with one another.
+     */
+    VG_VERDICT_UNCHECKED = 1,
+    /**
+     * Something looks wrong; the model may still be of use.
+     */
+    VG_VERDICT_DOUBTFUL = 2,
+    /**
+     * The input contradicts itself, or describes no road vehicle.
+     */
+    VG_VERDICT_BAD = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum vg_verdict vg_verdict;
+#else
+typedef int32_t vg_verdict;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * What draws.
  */
 enum vg_backend
@@ -707,6 +755,8 @@ typedef int32_t vg_depth_mode;
  * Worker threads and scratch memory, made once and named in the options of calls, so that a call neither starts
  * threads nor allocates what the last one had. Any number of threads may use one context at a time. Free it with
  * `vg_context_free`, after the last call that uses it has returned; results do not depend on it.
+ *
+ * In a fork, a context of the parent is `VG_STATUS_ARGUMENT`, and freeing it does nothing.
  */
 typedef struct vg_context vg_context;
 
@@ -757,7 +807,9 @@ typedef struct vg_context_options {
      */
     size_t struct_size;
     /**
-     * Worker threads, 1 to 1024; 0: one per core. The calling thread waits while they work.
+     * Threads that work, 1 to 1024; 0: one per core that the process may use, by its affinity and the quotas of its
+     * control groups. 1 is the calling thread, and none is started; of more, all are started, and the calling thread
+     * waits while they work. Default 0.
      */
     uint32_t threads;
     /**
@@ -858,8 +910,10 @@ typedef struct vg_view {
      */
     struct vg_image image;
     /**
-     * GRAY8, of the camera's size: 128 and above is vehicle. `data` NULL: the photograph's alpha is the mask; where
-     * it has none, or one that is 255 throughout, every pixel is vehicle, which the silhouette priors refuse.
+     * GRAY8, of the camera's size: 128 and above is vehicle; where no value is above 1, 1 is. A largest value between
+     * is an error. `data` NULL: the photograph's alpha is the mask; where it has none, or one that is 255 throughout,
+     * the outline of `depth` is, if that measures the vehicle alone (0 at the picture's border); else a
+     * reconstruction is refused.
      */
     struct vg_image mask;
     /**
@@ -909,9 +963,11 @@ typedef struct vg_model_options {
 } vg_model_options;
 
 /**
- * Called on the calling thread at every stage boundary and inside long stages: the stage's name, how much of it is
- * done, 0 to 1, and the caller's pointer. Returns 0 to go on; anything else ends the call with
- * `VG_STATUS_CANCELLED`. May call the library; may not throw or jump out.
+ * Called on the calling thread: the stage's name, how much of it is done, 0 to 1, and the caller's pointer. Returns 0
+ * to go on; anything else ends the call with `VG_STATUS_CANCELLED`. May call the library; may not throw or jump out.
+ *
+ * A reconstruction calls it at every stage boundary, inside long stages, and at the end. Calls of one stage call it at
+ * the start, about every 50 ms, and with 1 at the end; they stop within some tenths of a second.
  */
 typedef int32_t (*vg_progress_fn)(const char *stage,
                                   double fraction,
@@ -934,7 +990,7 @@ typedef struct vg_options {
      */
     size_t struct_size;
     /**
-     * Threads and memory to use. NULL: made for this call, one thread per core.
+     * Threads and memory to use. NULL: the process's own, one thread per core, see `vg_default_context_free`.
      */
     struct vg_context *context;
     /**
@@ -962,7 +1018,9 @@ typedef struct vg_options {
      */
     int32_t points;
     /**
-     * Length, width, height of the vehicle in metres, each 0.1 to 30; all 0: not known. Default 0, 0, 0.
+     * Length, width, height of the vehicle in metres, each 0.1 to 30, to a few centimetres; all 0: not known. The
+     * silhouettes tell where a box of this size stands, and no part of the vehicle is placed outside of it. Default 0, 0,
+     * 0.
      */
     double vehicle_size[3];
     /**
@@ -1054,6 +1112,38 @@ typedef struct vg_options {
      * Must be 0.
      */
     uint32_t refine_flags;
+    /**
+     * Centre of a box of `vehicle_size` in the frame of the cameras, metres, looked at where `has_vehicle_place` is 1. It
+     * is believed to a few decimetres, as a tracked box is. Default 0, 0, 0.
+     */
+    double vehicle_center[3];
+    /**
+     * Turn of that box about z, from the frame's x axis to the vehicle's, radians, at most 2 pi either way. The box's
+     * middle plane, not y = 0, is then the plane of symmetry; the result is in the frame of the cameras all the same.
+     * Default 0.
+     */
+    double vehicle_yaw;
+    /**
+     * 1: the box stands at `vehicle_center`, turned by `vehicle_yaw`; 0: its place is not known. 1 needs a
+     * `vehicle_size`. Default 0.
+     */
+    int32_t has_vehicle_place;
+    /**
+     * Must be 0.
+     */
+    uint32_t vehicle_flags;
+    /**
+     * NULL, or where the part of the whole call that is done is written before each call of `progress`: 0 to 1, in
+     * expected time; it never falls, and is 1 in the last call.
+     */
+    double *progress_overall;
+    /**
+     * Most Gaussians that the vehicle pixels of the used views and their mirror images may be able to become; 0: any
+     * number. Where they could become more, the views are resampled to fewer pixels, decided from the masks before the
+     * work, and the log and the report say so. A model usually has a half to a tenth of that. Default 12000000, whose PLY
+     * file would have 2 GB.
+     */
+    size_t max_gaussians;
 } vg_options;
 
 /**
@@ -1097,15 +1187,15 @@ typedef struct vg_report_figures {
      */
     uint64_t peak_rss_bytes;
     /**
-     * 1 if the three fields that follow hold the error on the input views, 0 if the check was switched off.
+     * 1 if the `input_` fields hold the error on the input views, 0 if the check was switched off.
      */
     int32_t has_input_error;
     /**
-     * 1 if the prior worked in a box whose size follows below.
+     * 1 if the prior looked for the vehicle in a box whose size follows below.
      */
     int32_t has_box;
     /**
-     * Mean PSNR over the used views, on white, full frame, dB.
+     * Mean PSNR over the used views, drawn by the cameras that were used, on white, full frame, dB.
      */
     double input_psnr_db;
     /**
@@ -1113,7 +1203,8 @@ typedef struct vg_report_figures {
      */
     double input_silhouette_iou;
     /**
-     * Length, width, height of the box, metres.
+     * Length, width, height of the box that the prior looked for the vehicle in, metres: larger than the vehicle, whose own
+     * size is `vehicle_size`.
      */
     double box_size[3];
     /**
@@ -1169,6 +1260,47 @@ typedef struct vg_report_figures {
      * Steps that the result has seen; 0 if nothing was better than the beginning.
      */
     uint32_t refine_kept;
+    /**
+     * Length, width, height of the vehicle, metres; outer mirrors are often missing from the width. 0, 0, 0 where
+     * `has_vehicle_size` is 0.
+     */
+    double vehicle_size[3];
+    /**
+     * Their expected errors, metres.
+     */
+    double vehicle_size_uncertainty[3];
+    /**
+     * 1 if `vehicle_size` holds the vehicle's size.
+     */
+    int32_t has_vehicle_size;
+    /**
+     * 1 if `vg_options.budget_s` was kept, or there was none; 0 if the call took longer.
+     */
+    int32_t budget_kept;
+    /**
+     * The least part of a view's mask that is drawn, 0 to 1, by the cameras that were used.
+     */
+    double input_mask_covered;
+    /**
+     * `input_psnr_db` as drawn by the caller's own cameras: it differs where the calibration moved them.
+     */
+    double input_given_psnr_db;
+    /**
+     * `input_silhouette_iou` as drawn by the caller's own cameras.
+     */
+    double input_given_silhouette_iou;
+    /**
+     * `input_mask_covered` as drawn by the caller's own cameras.
+     */
+    double input_given_mask_covered;
+    /**
+     * A `vg_verdict`; `vg_report_reason` tells why it is not good.
+     */
+    int32_t verdict;
+    /**
+     * How many reasons there are.
+     */
+    uint32_t reason_count;
 } vg_report_figures;
 
 /**
@@ -1313,8 +1445,7 @@ typedef struct vg_render_options {
      */
     size_t struct_size;
     /**
-     * Threads and memory to use. NULL: made for this call, one thread per core; make one where pictures follow
-     * each other.
+     * Threads and memory to use. NULL: the process's own, one thread per core, see `vg_default_context_free`.
      */
     struct vg_context *context;
     /**
@@ -1366,10 +1497,19 @@ typedef struct vg_render_options {
      * Reserved: 0.
      */
     uint32_t flags;
+    /**
+     * Called in the course of the call, see `vg_progress_fn`. NULL: none.
+     */
+    vg_progress_fn progress;
+    /**
+     * Handed to `progress`.
+     */
+    void *progress_user;
 } vg_render_options;
 
 /**
- * Where `vg_render` puts the picture: colour, depth, alpha, or several of them.
+ * Where `vg_render` puts the picture: colour, depth, alpha, or several of them, which share no byte; rows of one may
+ * lie in the gaps of another.
  */
 typedef struct vg_image_target {
     /**
@@ -1428,7 +1568,7 @@ typedef struct vg_renderer_options {
      */
     size_t struct_size;
     /**
-     * Threads to make ready with. NULL: made for this call, one per core.
+     * Threads to make ready with. NULL: the process's own, one per core, see `vg_default_context_free`.
      */
     struct vg_context *context;
     /**
@@ -1509,8 +1649,8 @@ typedef struct vg_image_gradient {
 
 /**
  * Where `vg_render_backward` puts gradients: arrays of the caller's, laid out as those of `vg_gaussian_arrays`, at
- * any address, NULL where not wanted. They are written whole, not added to. All numbers are finite: what a float32
- * cannot hold is its largest number of that sign.
+ * any address, NULL where not wanted, no byte in two of them or in the target. They are written whole, not added to.
+ * All numbers are finite: what a float32 cannot hold is its largest number of that sign.
  */
 typedef struct vg_gradients {
     /**
@@ -1578,7 +1718,7 @@ typedef struct vg_segment_options {
      */
     size_t struct_size;
     /**
-     * Threads to use. NULL: made for this call, one per core; make one where pictures follow each other.
+     * Threads to use. NULL: the process's own, one per core, see `vg_default_context_free`.
      */
     struct vg_context *context;
     /**
@@ -1596,7 +1736,7 @@ typedef struct vg_metrics_options {
      */
     size_t struct_size;
     /**
-     * Threads and memory to use. NULL: made for this call, one thread per core.
+     * Threads and memory to use. NULL: the process's own, one thread per core, see `vg_default_context_free`.
      */
     struct vg_context *context;
     /**
@@ -1611,6 +1751,14 @@ typedef struct vg_metrics_options {
      * Reserved: 0.
      */
     uint64_t flags;
+    /**
+     * Called in the course of `vg_metrics_view` and `vg_metrics_surface`, see `vg_progress_fn`. NULL: none.
+     */
+    vg_progress_fn progress;
+    /**
+     * Handed to `progress`.
+     */
+    void *progress_user;
 } vg_metrics_options;
 
 /**
@@ -1729,7 +1877,7 @@ typedef struct vg_align_options {
      */
     size_t struct_size;
     /**
-     * Threads to use. NULL: made for this call, one per core.
+     * Threads to use. NULL: the process's own, one per core, see `vg_default_context_free`.
      */
     struct vg_context *context;
     /**
@@ -1740,6 +1888,14 @@ typedef struct vg_align_options {
      * Reserved: 0.
      */
     uint32_t flags;
+    /**
+     * Called in the course of the call, see `vg_progress_fn`. NULL: none.
+     */
+    vg_progress_fn progress;
+    /**
+     * Handed to `progress`.
+     */
+    void *progress_user;
 } vg_align_options;
 
 /**
@@ -1791,7 +1947,7 @@ typedef struct vg_scene_options {
      */
     size_t struct_size;
     /**
-     * Threads that decode. NULL: made for this call, one thread per core.
+     * Threads that decode. NULL: the process's own, one per core, see `vg_default_context_free`.
      */
     struct vg_context *context;
     /**
@@ -1828,6 +1984,14 @@ typedef struct vg_scene_options {
      * Handed to `log`.
      */
     void *log_user;
+    /**
+     * Called in the course of the call, see `vg_progress_fn`. NULL: none.
+     */
+    vg_progress_fn progress;
+    /**
+     * Handed to `progress`.
+     */
+    void *progress_user;
 } vg_scene_options;
 
 #ifdef __cplusplus
@@ -1892,7 +2056,7 @@ vg_status vg_context_new(const struct vg_context_options *options,
                          struct vg_error **out_error);
 
 /**
- * How many worker threads a context has. NULL: 0.
+ * How many threads work in a context. NULL, and in a fork of the process that made it: 0.
  */
 VG_API
 uint32_t vg_context_threads(const struct vg_context *context);
@@ -1902,6 +2066,14 @@ uint32_t vg_context_threads(const struct vg_context *context);
  */
 VG_API
 void vg_context_free(struct vg_context *context);
+
+/**
+ * Ends the threads and frees the memory that calls which name no context have made for each other. One that is running
+ * is not disturbed, and the last of them ends the threads; the next such call makes them anew. Nothing happens where
+ * there was no such call.
+ */
+VG_API
+void vg_default_context_free(void);
 
 /**
  * Sets `*camera` to a pinhole without size at the origin. `size`: `sizeof *camera`.
@@ -2133,6 +2305,16 @@ VG_API
 const char *vg_report_json(const struct vg_report *report);
 
 /**
+ * Why the verdict is not good, the heaviest reason first: one line of UTF-8 that names the view where one is concerned,
+ * what was found, what is expected, the likely cause and the way out. `index`: below `vg_report_figures.reason_count`;
+ * beyond it an empty string. Lives as long as the report; the JSON has the parts, as `verdict_reasons`. NULL: an empty
+ * string. Never NULL.
+ */
+VG_API
+const char *vg_report_reason(const struct vg_report *report,
+                             size_t index);
+
+/**
  * How many points the metric coloured point cloud has; 0 unless `vg_options.points` was 1. NULL: 0.
  */
 VG_API
@@ -2210,9 +2392,10 @@ VG_API
 const float *vg_gaussians_sh(const struct vg_gaussians *gaussians);
 
 /**
- * Reads Gaussians from a PLY file in the layout of 3D Gaussian Splatting.
+ * Reads Gaussians from a PLY file in the layout of 3D Gaussian Splatting. Other formats (SPZ, SOG, .splat, packed PLY,
+ * glTF) and other kinds of Gaussians are errors that name them and the way out.
  *
- * - path: not NULL.
+ * - path: not NULL. A file or a pipe; a pipe that nothing writes to is an error after ten seconds.
  * - out: receives the Gaussians; the caller frees them. NULL on failure.
  * - out_error: NULL, or receives the error.
  */
@@ -2223,9 +2406,9 @@ vg_status vg_gaussians_load_ply(const char *path,
 
 /**
  * Writes Gaussians as a PLY file in the layout of 3D Gaussian Splatting. A file that is there is replaced once the
- * new one is complete; on failure it is as it was.
+ * new one is complete and on the disk, and keeps its permissions; on failure it is as it was.
  *
- * - gaussians, path: not NULL.
+ * - gaussians, path: not NULL. A name that ends like that of another format, car.spz, is refused.
  * - out_error: NULL, or receives the error.
  */
 VG_API
@@ -2613,8 +2796,8 @@ vg_status vg_renderer_new(const struct vg_gaussians *gaussians,
  * - cameras: `count` of them, not NULL.
  * - count: 1 to 4096.
  * - options: NULL for the default values. `backend` is not looked at: the renderer has one.
- * - targets: `count` of them, not NULL. The memory they point to is written when its picture is done; the arguments of
- *   all pictures are checked before the first is drawn.
+ * - targets: `count` of them, not NULL, no byte of memory in two. The memory they point to is written when its picture
+ *   is done; the arguments of all pictures are checked before the first is drawn.
  * - out_error: NULL, or receives the error.
  *
  * The same arguments give the same bytes with any number of threads on one machine; those of a graphics processor
@@ -2672,7 +2855,8 @@ vg_status vg_gradients_init(struct vg_gradients *gradients,
  *
  * - gaussians: not NULL. Any number of threads may use them at a time.
  * - camera: not NULL.
- * - options: those of the picture; NULL for the default values. With a transparent background and a gradient of
+ * - options: those of the picture; NULL for the default values. With a target `progress` is not called; `loss` can end
+ *   the call. With a transparent background and a gradient of
  *   colour, `alpha` must be `VG_ALPHA_PREMULTIPLIED`.
  * - target: NULL, or receives the picture; `gradient->loss` needs one. The memory it points to is written on success,
  *   and before `loss` is called.
@@ -2756,7 +2940,8 @@ vg_status vg_surface_errors_init(struct vg_surface_errors *errors,
 /**
  * Compares two pictures.
  *
- * - a, b: RGB8, BGR8, RGBA8, BGRA8, GRAY8 or RGBA32F, of one size; what their alpha leaves open is white. Not NULL.
+ * - a, b: RGB8, BGR8, RGBA8, BGRA8, GRAY8 or RGBA32F, of one size; what their alpha leaves open is white. Floats are
+ *   0 to 1, and what is more than 1 beyond is an error. Not NULL.
  * - options: NULL for the default values.
  * - out: a struct that `vg_picture_errors_init` was called for; unchanged on failure.
  * - out_error: NULL, or receives the error.
@@ -2909,8 +3094,10 @@ vg_status vg_scene_options_init(struct vg_scene_options *options,
                                 size_t size);
 
 /**
- * Reads a COLMAP folder: a model (binary or text) in `sparse/0`, in `sparse` or in the folder itself, photographs
- * in `images`, masks in `masks`, depth in `depth`.
+ * Reads a COLMAP folder: a model (binary or text) in `sparse/0`, in `sparse` or in the folder itself, of several
+ * numbered ones that with the most images; photographs in `images`, masks in `masks` or `mask` (`<stem>.png`,
+ * `<name>.png`, `<stem>_mask.png` or `<stem>.mask.png`; PNG, JPEG or NumPy), depth in `depth` (PNG, NumPy, PFM or
+ * EXR). Two colours of which one is black are a mask whatever the other is.
  *
  * - path: the folder; not NULL.
  * - options: not NULL, because a COLMAP model needs `vehicle_from_world`.
@@ -2924,7 +3111,8 @@ vg_status vg_colmap_open(const char *path,
                          struct vg_error **out_error);
 
 /**
- * Reads a nerfstudio scene: a `transforms.json`, or a folder with one.
+ * Reads a nerfstudio or an instant-ngp scene: a `transforms.json`, or a folder with one. Masks and depth that the file
+ * does not list are looked for as in a COLMAP folder.
  *
  * - path: the file or folder; not NULL.
  * - options: NULL for the default values.

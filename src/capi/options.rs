@@ -11,7 +11,7 @@ use crate::pipeline::{Calibrate, DEFAULT_MAX_GAUSSIANS, Keep, Options, PriorChoi
 use crate::refine::{Amount, RefineOptions};
 use crate::relight::Relight;
 use crate::scene::cloud::MAX_CLOUD_POINTS;
-use crate::scene::{Cloud, Place};
+use crate::scene::{Cloud, Place, VehicleBox};
 use crate::symmetry::SymmetryMode;
 use std::ffi::{CString, c_char, c_void};
 
@@ -273,14 +273,14 @@ impl vg_options {
         read::zero("options.flags", self.flags == 0)?;
         read::zero("options.vehicle_flags", self.vehicle_flags == 0)?;
         let unknown_size = self.vehicle_size == [0.0; 3];
-        let placed = read::flag("options.has_vehicle_place", self.has_vehicle_place)?;
+        let vehicle_place = self.vehicle_place()?;
         Ok(Options {
             prior: read::choice("options.prior", self.prior, &priors)?,
             prior_model: unsafe { model::lent(self.prior_model) },
             head_model: unsafe { model::lent(self.head_model) },
             symmetry: read::choice("options.symmetry", self.symmetry, &symmetries)?,
             vehicle_size: (!unknown_size).then_some(self.vehicle_size),
-            vehicle_place: placed.then_some(Place { center: self.vehicle_center, yaw: self.vehicle_yaw }),
+            vehicle_place,
             sh_degree: sh_degree("options.sh_degree", self.sh_degree)?,
             keep: keep(self.keep)?,
             calibrate: read::choice("options.calibrate", self.calibrate, &calibrations)?,
@@ -297,6 +297,21 @@ impl vg_options {
             points: read::flag("options.points", self.points)?,
             threads: 0,
         })
+    }
+
+    /// Where the vehicle's box stands, by C's names in the error.
+    fn vehicle_place(&self) -> Result<Option<Place>> {
+        let placed = read::flag("options.has_vehicle_place", self.has_vehicle_place)?;
+        let place = placed.then_some(Place { center: self.vehicle_center, yaw: self.vehicle_yaw });
+        if place.is_some() {
+            let names = [
+                ("options.vehicle_place.center", "options.vehicle_center"),
+                ("options.vehicle_place.yaw", "options.vehicle_yaw"),
+            ];
+            let known = VehicleBox { size: self.vehicle_size, place };
+            known.validate("options").map_err(|e| read::renamed(e, &names))?;
+        }
+        Ok(place)
     }
 
     fn refinement(&self) -> Result<Option<RefineOptions>> {

@@ -2,13 +2,12 @@
 
 use super::buffer::Gaussians;
 use glam::{DMat3, DQuat, DVec3};
-use rayon::prelude::*;
 
 impl Gaussians {
     /// Covariance matrices in the vehicle frame, square metres: xx, xy, xz, yy, yz, zz of each, as 3D Gaussian Splatting
     /// orders them. Computed in f64; what is below the smallest f32 becomes 0. `[n][6]`
     pub fn covariances(&self) -> Vec<[f32; 6]> {
-        self.rotations().par_iter().zip(self.scales()).map(|(q, s)| covariance(*q, *s)).collect()
+        self.rotations().iter().zip(self.scales()).map(|(q, s)| covariance(*q, *s)).collect()
     }
 }
 

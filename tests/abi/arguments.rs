@@ -1024,6 +1024,22 @@ fn views_that_make_no_vehicle_are_told_by_index() {
     table.row(make, "masks without vehicle", blind, refused("views"));
     let unknown_size = |call: &mut Call| (0..3).for_each(|k| call.lent("options").put("vehicle_size", k, 0));
     table.row(make, "a vehicle of unknown size", unknown_size, Fine);
+    let placed = |call: &mut Call| call.lent("options").put("has_vehicle_place", 0, 1);
+    let degrees = |call: &mut Call| {
+        placed(call);
+        call.lent("options").put("vehicle_yaw", 0, 90f64.to_bits());
+    };
+    table.row(make, "a box turned by degrees", degrees, refused("options.vehicle_yaw"));
+    let nowhere = |call: &mut Call| {
+        placed(call);
+        call.lent("options").put("vehicle_center", 1, f64::NAN.to_bits());
+    };
+    table.row(make, "a box that stands nowhere", nowhere, refused("options.vehicle_center"));
+    let sizeless = |call: &mut Call| {
+        placed(call);
+        unknown_size(call);
+    };
+    table.row(make, "a place without a size", sizeless, refused("options.vehicle_size"));
     table.row(make, "no context", |call| call.lent("options").put("context", 0, 0), Fine);
 }
 
@@ -1741,7 +1757,7 @@ fn alone_threads_end_with_their_context() {
         ] {
             let mut call = make(&table.world);
             call.lent("options").put("context", 0, 0);
-            assert!(call.run(true).is_ok());
+            assert_eq!(call.run(true).status, call.good);
             assert_eq!(threads(), here + of_the_process, "{} uses the process's context", call.function);
         }
         unsafe { vg_default_context_free() };

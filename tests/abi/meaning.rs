@@ -245,6 +245,22 @@ fn each_camera_model_projects_where_colmap_does() {
             let status = unsafe {
                 vg_camera_project(&raw const camera, point.as_ptr(), found.as_mut_ptr(), null_mut())
             };
+            // COLMAP projects points beyond the fold of a lens too, to where others are seen.
+            if status == vg_status::Argument {
+                let mut seen = [f64::NAN; 3];
+                let status = unsafe {
+                    vg_camera_unproject(
+                        &raw const camera,
+                        pixel.as_ptr(),
+                        point[2],
+                        seen.as_mut_ptr(),
+                        null_mut(),
+                    )
+                };
+                let is_elsewhere = (seen[0] - point[0]).abs().max((seen[1] - point[1]).abs()) > 1e-3;
+                assert!(status != vg_status::Ok || is_elsewhere, "{case}: {point:?}");
+                continue;
+            }
             assert_eq!(status, vg_status::Ok);
             let off = (found[0] - pixel[0]).abs().max((found[1] - pixel[1]).abs());
             assert!(off < 1e-9, "{}: {found:?} {pixel:?}", case["model"]);

@@ -172,15 +172,13 @@ def test_options_reach_the_library(ellipsoid: Views) -> None:
 @pytest.mark.parametrize("face", [vg, capi])
 def test_a_box_may_bring_its_place_by_either_face(face: Any, ellipsoid: Views) -> None:
     views = (ellipsoid.images[:1], ellipsoid.masks[:1], ellipsoid.cameras[:1])
-    if face is capi:
-        views = (views[0], views[1], [capi.Camera.from_matrix(c.K, c.pose, c.width, c.height) for c in views[2]])
     made = face.reconstruct(*views, prior="hull", check=False, vehicle_size=(4.4, 1.8, 1.4), vehicle_place=(0, 0, 0, 0))
     vehicle = made.report["vehicle"]
     for found, true, error in zip(vehicle["size_m"], (4.4, 1.8, 1.4), vehicle["uncertainty_m"], strict=True):
         assert abs(found - true) < 2 * error
-    with pytest.raises(vg.VgError, match="vehicle_place.*radians"):
+    with pytest.raises(vg.VgError, match="yaw.*radians"):
         face.reconstruct(*views, vehicle_size=(4.4, 1.8, 1.4), vehicle_place=(0, 0, 0, 90))
-    with pytest.raises(vg.VgError, match="vehicle_size: none; allowed: length, width, height"):
+    with pytest.raises(vg.VgError, match="vehicle_size: .*; allowed: length, width, height"):
         face.reconstruct(*views, vehicle_place=(0, 0, 0, 0))
 
 
