@@ -40,7 +40,9 @@ fn layout_of_rust() -> String {
         )* };
     }
     lay_out! {
-        vg_align_options { struct_size context heading flags }
+        vg_align_options {
+            struct_size context heading flags progress progress_user
+        }
         vg_alignment {
             struct_size vehicle_from_world scale residual_m confidence residual_px other_px used_count
         }
@@ -59,7 +61,9 @@ fn layout_of_rust() -> String {
             struct_size width height color color_row_stride depth depth_row_stride color_format flags alpha
             alpha_row_stride
         }
-        vg_metrics_options { struct_size context lpips f_score_m flags }
+        vg_metrics_options {
+            struct_size context lpips f_score_m flags progress progress_user
+        }
         vg_model_options { struct_size runtime provider fall_back threads prepack arena flags }
         vg_options {
             struct_size context prior symmetry sh_degree keep check points vehicle_size progress progress_user log
@@ -77,7 +81,7 @@ fn layout_of_rust() -> String {
         }
         vg_render_options {
             struct_size context backend background background_color alpha depth_mode sh_degree antialiased blur
-            near_plane far_plane max_alpha flags
+            near_plane far_plane max_alpha flags progress progress_user
         }
         vg_renderer_options { struct_size context backend flags }
         vg_report_figures {
@@ -90,6 +94,7 @@ fn layout_of_rust() -> String {
         }
         vg_scene_options {
             struct_size context vehicle_from_world names name_count depth_scale load_depth flags log log_user
+            progress progress_user
         }
         vg_segment_options { struct_size context flags }
         vg_surface_errors {

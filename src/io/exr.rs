@@ -120,7 +120,7 @@ mod tests {
             let encoding = Encoding {
                 compression: Compression::ZIP16,
                 blocks: Blocks::ScanLines,
-                ..Encoding::default()
+                line_order: LineOrder::Increasing,
             };
             let channels = AnyChannels::sort(list.collect());
             let layer = Layer::new((8192, 1), LayerAttributes::default(), encoding, channels);

@@ -302,7 +302,7 @@ fn number(json: &Value, place: &str) -> f64 {
 #[test]
 fn each_figure_of_a_report_is_rusts_number_and_the_jsons() {
     let report = report();
-    let json: Value = serde_json::to_value(&report).unwrap();
+    let json: Value = serde_json::from_str(&serde_json::to_string(&report).unwrap()).unwrap();
     let figures = vg_report_figures::of(&report);
     let through_c = unsafe {
         let object = ReportObject::new(report.clone(), None).into_raw();
@@ -515,7 +515,7 @@ fn each_enumerator_means_its_namesake_in_rust() {
         match render::backend("backend", backend as i32) {
             Ok(rust) => held.namesakes("vg_backend", backend, rust),
             Err(Error::NotBuilt { found, .. }) => {
-                held.namesakes("vg_backend", backend, found.trim_matches('"'))
+                held.namesakes("vg_backend", backend, format_args!("{}", found.trim_matches('"')))
             }
             Err(other) => panic!("{other}"),
         }
