@@ -2,6 +2,7 @@
 
 use super::buffer::Gaussians;
 use crate::error::{Error, Result};
+use std::cmp::Ordering::{Equal, Less};
 
 impl Gaussians {
     /// Those at `indices`, in that order; an index may come again.
@@ -33,7 +34,8 @@ impl Gaussians {
     /// # Errors
     /// A NaN, or `low` above `high`. Infinite sides are open.
     pub fn cropped(&self, low: [f32; 3], high: [f32; 3]) -> Result<Self> {
-        if let Some(k) = (0..3).find(|&k| !(low[k] <= high[k])) {
+        let ordered = |k: &usize| matches!(low[*k].partial_cmp(&high[*k]), Some(Less | Equal));
+        if let Some(k) = (0..3).find(|k| !ordered(k)) {
             let found = format!("{} with high[{k}] {}", low[k], high[k]);
             return Err(Error::argument(format!("low[{k}]"), found, "not above high"));
         }

@@ -65,7 +65,7 @@ impl Camera {
     /// The point at planar depth `depth_m` behind a pixel, metres, vehicle frame. `None` where the lens has no ray to the
     /// pixel, and where the depth is not above 0, which means no measurement, or not finite.
     pub fn vehicle_from_pixel(&self, pixel: [f64; 2], depth_m: f64) -> Option<DVec3> {
-        if !(depth_m > 0.0) {
+        if depth_m.is_nan() || depth_m <= 0.0 {
             return None;
         }
         let point = self.vehicle_from_camera.transform_point(self.ray(pixel)? * depth_m);

@@ -126,7 +126,7 @@ impl Turntable {
         if !(1..=MOST_CAMERAS).contains(&count) {
             return Err(Error::argument("count", count.to_string(), format!("1 to {MOST_CAMERAS} cameras")));
         }
-        if !(self.elevation_degrees.abs() <= 89.0) {
+        if !(-89.0..=89.0).contains(&self.elevation_degrees) {
             let allowed = "-89 to 89 degrees";
             return Err(Error::argument("elevation_degrees", self.elevation_degrees.to_string(), allowed));
         }

@@ -18,7 +18,8 @@ const NOISE: f32 = 0.02;
 /// Parts of one vehicle hang together to this, metres.
 const LOOSE_M: f32 = 0.5;
 
-/// A patch of depth that hangs together with nothing else is a stray below this share of the vehicle's pixels.
+/// A patch of depth that hangs together with nothing else, nearer or farther than all that does, is a stray below this
+/// share of the vehicle's pixels.
 const STRAY_SHARE: f64 = 0.005;
 
 /// A place that lies farther outside another view's silhouette is not the vehicle's, metres: poses are wrong by less,
@@ -32,7 +33,7 @@ pub(super) enum Doubt {
     None,
     /// Between two surfaces, or a surface and nothing: an edge runs on both of its sides.
     Floating,
-    /// One of a small patch that hangs loose.
+    /// One of a small patch before or behind the vehicle.
     Stray,
     /// Outside the silhouette in most of the other views that could show it.
     Denied,
@@ -69,8 +70,16 @@ fn loose(view: &View, depth: &DepthMap) -> Vec<Doubt> {
     let mut vehicle: Vec<bool> = (0..z.len()).map(|i| z[i] > 0.0 && is_vehicle(i)).collect();
     let few = STRAY_SHARE * vehicle.iter().filter(|v| **v).count() as f64;
     vehicle.iter_mut().zip(&doubts).for_each(|(vehicle, doubt)| *vehicle &= *doubt == Doubt::None);
-    for patch in patches(&vehicle, z, width) {
-        if (patch.len() as f64) < few {
+    let (small, large): (Vec<_>, Vec<_>) =
+        patches(&vehicle, z, width).into_iter().partition(|patch| (patch.len() as f64) < few);
+    let range = |patch: &[usize]| {
+        patch.iter().fold((f32::INFINITY, 0.0f32), |(low, high), &i| (low.min(z[i]), high.max(z[i])))
+    };
+    // Between these, as through a window, a small patch may well be a part of the vehicle.
+    let (low, high) = range(&large.concat());
+    for patch in small.into_iter().filter(|_| !large.is_empty()) {
+        let (near, far) = range(&patch);
+        if far < low - LOOSE_M || near > high + LOOSE_M {
             patch.into_iter().for_each(|i| doubts[i] = Doubt::Stray);
         }
     }
@@ -205,5 +214,12 @@ mod tests {
             assert_eq!(taken, drawn, "{side}");
         }
         assert!(block(12).iter().all(|d| *d == Doubt::None));
+        // Of the vehicle's own range.
+        let seen_through = doubts(|u, v| match (u, v) {
+            (20..22, 10..12) => Some(3.0),
+            (40.., _) => Some(3.2),
+            _ => None,
+        });
+        assert!(seen_through.iter().all(|d| *d == Doubt::None));
     }
 }

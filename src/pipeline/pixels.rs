@@ -51,7 +51,7 @@ pub(super) fn kept(
         (Verdict::NoDepth, "no depth measured"),
         (Verdict::Edge, "on the silhouette's edge, half background; the neighbours' footprints cover it"),
         (Verdict::Floating, "floating between two surfaces at a depth edge"),
-        (Verdict::Stray, "a patch of depth that hangs together with nothing else of the vehicle"),
+        (Verdict::Stray, "a small patch of depth before or behind the vehicle"),
         (Verdict::Denied, "farther outside the vehicle in most other views' masks than poses are wrong"),
         (Verdict::Redundant, "another view shows the same surface at a higher resolution"),
     ] {

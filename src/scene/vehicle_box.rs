@@ -71,7 +71,8 @@ impl Place {
             let found = format!("{:?}", self.center);
             return Err(Error::argument(format!("{prefix}.center"), found, "finite numbers, metres"));
         }
-        if !(self.yaw.abs() <= std::f64::consts::TAU) {
+        const TURN: f64 = std::f64::consts::TAU;
+        if !(-TURN..=TURN).contains(&self.yaw) {
             let allowed = "-2 pi to 2 pi, in radians";
             return Err(Error::argument(format!("{prefix}.yaw"), self.yaw.to_string(), allowed));
         }

@@ -106,7 +106,8 @@ pub(crate) fn write(path: &Path, drawn: &Rendered, background: Background) -> vg
 
 /// `<image stem>.png` for each picture's name; where two would be one, all with the folders of their names, and where
 /// that does not tell them apart either, with their extensions too.
-pub(crate) fn picture_names<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Vec<PathBuf> {
+pub(crate) fn picture_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<PathBuf> {
+    let names: Vec<&str> = names.into_iter().collect();
     let png = |path: &Path| {
         let mut longer = path.as_os_str().to_owned();
         longer.push(".png");
@@ -116,7 +117,8 @@ pub(crate) fn picture_names<'a>(names: impl Iterator<Item = &'a str> + Clone) ->
     let file_name = |path: PathBuf| path.file_name().map(PathBuf::from).unwrap_or(path);
     let ways: [&dyn Fn(&str) -> PathBuf; 3] =
         [&|name| png(&file_name(stem(name))), &|name| png(&stem(name)), &|name| png(Path::new(name))];
-    let named = |way: &dyn Fn(&str) -> PathBuf| -> Vec<PathBuf> { names.clone().map(way).collect() };
+    let named =
+        |way: &dyn Fn(&str) -> PathBuf| -> Vec<PathBuf> { names.iter().map(|name| way(name)).collect() };
     let are_distinct = |paths: &[PathBuf]| paths.iter().collect::<BTreeSet<_>>().len() == paths.len();
     let all = ways.map(named);
     let [short, ..] = &all;

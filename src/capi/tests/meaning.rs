@@ -67,7 +67,7 @@ fn assert_effects<C: Copy, R>(
 #[test]
 fn each_option_of_a_reconstruction_sets_its_namesake() {
     fn refinement(options: &Options) -> RefineOptions {
-        options.refine.clone().unwrap_or_default()
+        options.refine.unwrap_or_default()
     }
     fn place(options: &mut vg_options) -> &mut vg_options {
         (options.vehicle_size, options.has_vehicle_place) = ([4.5, 1.75, 1.5], 1);
@@ -515,7 +515,7 @@ fn each_enumerator_means_its_namesake_in_rust() {
         match render::backend("backend", backend as i32) {
             Ok(rust) => held.namesakes("vg_backend", backend, rust),
             Err(Error::NotBuilt { found, .. }) => {
-                held.namesakes("vg_backend", backend, format_args!("{}", found.trim_matches('"')))
+                held.namesakes("vg_backend", backend, format_args!("{}", found.trim_matches('"')));
             }
             Err(other) => panic!("{other}"),
         }
