@@ -71,7 +71,7 @@ fn a_given_box_narrows_the_hull_and_is_reported_as_given() {
 }
 
 fn half(axis: usize) -> f64 {
-    f64::from(HALF[axis])
+    HALF[axis]
 }
 
 fn true_size() -> [f64; 3] {
