@@ -63,7 +63,9 @@ fn a_scan_gives_the_sample_s_frame_and_says_how_well_it_fits() {
     );
     // Left out, and said.
     fs::remove_file(at.join("masks/007.png")).unwrap();
-    let out = succeed(at, "align {} --scan {}/scan.ply -o {}/v.json").out;
+    let run = succeed_with_warnings(at, "align {} --scan {}/scan.ply -o {}/v.json");
+    assert!(run.err.contains("007.png: no mask: looked for masks/"), "{run:?}");
+    let out = run.out;
     assert!(out.contains("7 masks; 1 views without one were left out"), "{out}");
 }
 

@@ -7,7 +7,9 @@ use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 fn start(words: &str) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_vg"))
+    // Tests that are run in the background hand on that INT is ignored.
+    Command::new("env")
+        .args(["--default-signal=INT,TERM,HUP", env!("CARGO_BIN_EXE_vg")])
         .args(words.split_whitespace())
         .current_dir(sample())
         .stdin(Stdio::piped())

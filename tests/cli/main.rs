@@ -62,6 +62,14 @@ fn succeed(folder: &Path, words: &str) -> Run {
     run
 }
 
+/// As [`vg_in`], and it succeeds; all that it says on standard error are warnings.
+fn succeed_with_warnings(folder: &Path, words: &str) -> Run {
+    let run = vg_in(folder, words);
+    assert_eq!(run.code, 0, "vg {words}: {run:?}");
+    assert!(run.err.lines().all(|line| line.starts_with("vg: warning: ")), "vg {words}: {run:?}");
+    run
+}
+
 /// As [`vg_in`], and it fails as promised: the code, nothing on standard output, and one line on standard error
 /// that says all of `causes`.
 fn fail(folder: &Path, words: &str, code: i32, causes: &[&str]) {

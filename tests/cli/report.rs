@@ -109,7 +109,7 @@ fn names_of_files_are_text_and_nothing_else() {
 fn what_is_judged_follows_the_split_and_the_page_says_how() {
     let folder = tempfile::tempdir().unwrap();
     let made = |words: &str| {
-        succeed(folder.path(), &format!("report . --prior hull {words} -o {{}}/page.html"));
+        succeed_with_warnings(folder.path(), &format!("report . --prior hull {words} -o {{}}/page.html"));
         fs::read_to_string(folder.path().join("page.html")).unwrap()
     };
     let page = made("--views 001,002");
