@@ -53,15 +53,25 @@
  * NULL.      Allowed where a comment says what it means; everywhere else it is an error, never a crash.
  *
  * Threads.   Handles never change after they are made. Any number of threads may use one handle at a time, a
- *            vg_context too; only its _free must come last. The library starts threads of its own, in a context or
- *            for the length of a call, and ends them with it; it has no other state, and does not touch signal
- *            handlers, the locale, standard output or standard error. Callbacks come on the calling thread. After
- *            fork, the child must not use a context of the parent.
+ *            vg_context too; only its _free must come last. Worker threads belong to a context and end with it; a
+ *            context of one thread has none and works on the calling thread, which needs 1 MiB of stack. Calls that
+ *            name no context share one of the process, with a thread per core, which the first of them makes and
+ *            vg_default_context_free ends. Where the system starts no thread, that is VG_STATUS_THREADS. Worker
+ *            threads block signals, so that handlers run on the host's threads. The library has no other state, and
+ *            does not touch signal handlers, errno, the locale, standard output or standard error. Callbacks come on
+ *            the calling thread.
+ *
+ * Forks.     In the child, a context or vg_model of the parent is VG_STATUS_ARGUMENT, and freeing it does nothing;
+ *            Gaussians, scenes, reports, and calls that name no context, work as they did. A vg_renderer that draws
+ *            on a graphics processor must not be used there.
+ *
+ * Unloading. dlclose is allowed once no call is running, but the code stays in memory: threads that called the
+ *            library run destructors of it when they end. The library is linked with -z nodelete, and so must be a
+ *            shared object that is linked with libvg.a, unless it is never unloaded.
  *
  * Networks.  vg_model_open loads ONNX Runtime, a shared library, when the first model is opened and not before; it
- *            stays loaded until the process ends, and libvg must then not be unloaded either. A vg_model is a
- *            handle like the others; its threads are the runtime's own. After fork, the child must not use a model
- *            of the parent.
+ *            stays loaded until the process ends. A vg_model is a handle like the others; its threads are the
+ *            runtime's own.
  *
  * Errors.    Functions that can fail return a vg_status and, through out_error, an object with a message: which
  *            argument, what was found, what is allowed. On failure, out handles are NULL, and everything the caller
@@ -161,6 +171,10 @@ enum vg_status
      * What was asked for needs something that this machine does not have: ONNX Runtime, a device.
      */
     VG_STATUS_MISSING = 8,
+    /**
+     * The operating system did not start the threads that were asked for.
+     */
+    VG_STATUS_THREADS = 9,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -672,6 +686,8 @@ typedef int32_t vg_depth_mode;
  * Worker threads and scratch memory, made once and named in the options of calls, so that a call neither starts
  * threads nor allocates what the last one had. Any number of threads may use one context at a time. Free it with
  * `vg_context_free`, after the last call that uses it has returned; results do not depend on it.
+ *
+ * In a fork, a context of the parent is `VG_STATUS_ARGUMENT`, and freeing it does nothing.
  */
 typedef struct vg_context vg_context;
 
@@ -722,7 +738,9 @@ typedef struct vg_context_options {
      */
     size_t struct_size;
     /**
-     * Worker threads, 1 to 1024; 0: one per core. The calling thread waits while they work.
+     * Threads that work, 1 to 1024; 0: one per core that the process may use, by its affinity and the quotas of its
+     * control groups. 1 is the calling thread, and none is started; of more, all are started, and the calling thread
+     * waits while they work. Default 0.
      */
     uint32_t threads;
     /**
@@ -899,7 +917,7 @@ typedef struct vg_options {
      */
     size_t struct_size;
     /**
-     * Threads and memory to use. NULL: made for this call, one thread per core.
+     * Threads and memory to use. NULL: the process's own, one thread per core, see `vg_default_context_free`.
      */
     struct vg_context *context;
     /**
@@ -1187,8 +1205,7 @@ typedef struct vg_render_options {
      */
     size_t struct_size;
     /**
-     * Threads and memory to use. NULL: made for this call, one thread per core; make one where pictures follow
-     * each other.
+     * Threads and memory to use. NULL: the process's own, one thread per core, see `vg_default_context_free`.
      */
     struct vg_context *context;
     /**
@@ -1243,7 +1260,8 @@ typedef struct vg_render_options {
 } vg_render_options;
 
 /**
- * Where `vg_render` puts the picture: colour, depth, alpha, or several of them.
+ * Where `vg_render` puts the picture: colour, depth, alpha, or several of them, which share no byte; rows of one may
+ * lie in the gaps of another.
  */
 typedef struct vg_image_target {
     /**
@@ -1302,7 +1320,7 @@ typedef struct vg_renderer_options {
      */
     size_t struct_size;
     /**
-     * Threads to make ready with. NULL: made for this call, one per core.
+     * Threads to make ready with. NULL: the process's own, one per core, see `vg_default_context_free`.
      */
     struct vg_context *context;
     /**
@@ -1383,8 +1401,8 @@ typedef struct vg_image_gradient {
 
 /**
  * Where `vg_render_backward` puts gradients: arrays of the caller's, laid out as those of `vg_gaussian_arrays`, at
- * any address, NULL where not wanted. They are written whole, not added to. All numbers are finite: what a float32
- * cannot hold is its largest number of that sign.
+ * any address, NULL where not wanted, no byte in two of them or in the target. They are written whole, not added to.
+ * All numbers are finite: what a float32 cannot hold is its largest number of that sign.
  */
 typedef struct vg_gradients {
     /**
@@ -1452,7 +1470,7 @@ typedef struct vg_segment_options {
      */
     size_t struct_size;
     /**
-     * Threads to use. NULL: made for this call, one per core; make one where pictures follow each other.
+     * Threads to use. NULL: the process's own, one per core, see `vg_default_context_free`.
      */
     struct vg_context *context;
     /**
@@ -1470,7 +1488,7 @@ typedef struct vg_metrics_options {
      */
     size_t struct_size;
     /**
-     * Threads and memory to use. NULL: made for this call, one thread per core.
+     * Threads and memory to use. NULL: the process's own, one thread per core, see `vg_default_context_free`.
      */
     struct vg_context *context;
     /**
@@ -1603,7 +1621,7 @@ typedef struct vg_align_options {
      */
     size_t struct_size;
     /**
-     * Threads to use. NULL: made for this call, one per core.
+     * Threads to use. NULL: the process's own, one per core, see `vg_default_context_free`.
      */
     struct vg_context *context;
     /**
@@ -1665,7 +1683,7 @@ typedef struct vg_scene_options {
      */
     size_t struct_size;
     /**
-     * Threads that decode. NULL: made for this call, one thread per core.
+     * Threads that decode. NULL: the process's own, one per core, see `vg_default_context_free`.
      */
     struct vg_context *context;
     /**
@@ -1759,7 +1777,7 @@ vg_status vg_context_new(const struct vg_context_options *options,
                          struct vg_error **out_error);
 
 /**
- * How many worker threads a context has. NULL: 0.
+ * How many threads work in a context. NULL, and in a fork of the process that made it: 0.
  */
 VG_API
 uint32_t vg_context_threads(const struct vg_context *context);
@@ -1769,6 +1787,14 @@ uint32_t vg_context_threads(const struct vg_context *context);
  */
 VG_API
 void vg_context_free(struct vg_context *context);
+
+/**
+ * Ends the threads and frees the memory that calls which name no context have made for each other. One that is running
+ * is not disturbed, and the last of them ends the threads; the next such call makes them anew. Nothing happens where
+ * there was no such call.
+ */
+VG_API
+void vg_default_context_free(void);
 
 /**
  * Sets `*camera` to a pinhole without size at the origin. `size`: `sizeof *camera`.
@@ -2222,8 +2248,8 @@ vg_status vg_renderer_new(const struct vg_gaussians *gaussians,
  * - cameras: `count` of them, not NULL.
  * - count: 1 to 4096.
  * - options: NULL for the default values. `backend` is not looked at: the renderer has one.
- * - targets: `count` of them, not NULL. The memory they point to is written when its picture is done; the arguments of
- *   all pictures are checked before the first is drawn.
+ * - targets: `count` of them, not NULL, no byte of memory in two. The memory they point to is written when its picture
+ *   is done; the arguments of all pictures are checked before the first is drawn.
  * - out_error: NULL, or receives the error.
  *
  * The same arguments give the same bytes with any number of threads on one machine; those of a graphics processor
