@@ -1600,7 +1600,7 @@ fn alone_threads_end_with_their_context() {
         ] {
             let mut call = make(&table.world);
             call.lent("options").put("context", 0, 0);
-            assert!(call.run(true).is_ok());
+            assert_eq!(call.run(true).status, call.good);
             assert_eq!(threads(), here + of_the_process, "{} uses the process's context", call.function);
         }
         unsafe { vg_default_context_free() };

@@ -23,7 +23,8 @@ enum Kind {
 fn structs(header: &str) -> Vec<(String, Vec<Field>)> {
     let mut structs = Vec::new();
     let mut inside: Option<(String, Vec<Field>)> = None;
-    for line in header.lines().map(str::trim) {
+    let code = header.lines().map(str::trim).filter(|line| !line.starts_with(['*', '/', '#']));
+    for line in code {
         if let Some(name) = line.strip_prefix("typedef struct ").and_then(|l| l.strip_suffix(" {")) {
             inside = Some((name.to_owned(), Vec::new()));
         } else if line.starts_with('}') {

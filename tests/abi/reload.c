@@ -15,6 +15,9 @@
 
 #include "vg.h"
 
+/* What vg.h says that a calling thread needs. */
+enum { STACK_BYTES = 1 << 20 };
+
 /* Names of views: four of them are enough. */
 static const char *const names[4] = {"000", "001", "002", "003"};
 
@@ -120,7 +123,7 @@ static void *use(void *asked) {
         }
         CHECK(vg_options_init(&options, sizeof options) == VG_STATUS_OK);
         options.context = context;
-        options.prior = VG_PRIOR_GIVEN;
+        options.prior = VG_PRIOR_SHAPE;
         options.resolution = 0.25;
         CHECK(vg_reconstruct(views, 4, &options, &car, NULL, NULL) == VG_STATUS_OK);
         CHECK(vg_gaussians_save_ply(car, ply_path, NULL) == VG_STATUS_OK);
@@ -158,7 +161,11 @@ int main(int argc, char **argv) {
     snprintf(ply_path, sizeof ply_path, "%s/reload.ply", argv[3]);
     for (round = 0; round < 3; round++) {
         pthread_t thread;
-        CHECK(pthread_create(&thread, NULL, use, &asked[round]) == 0);
+        pthread_attr_t attributes;
+        CHECK(pthread_attr_init(&attributes) == 0);
+        CHECK(pthread_attr_setstacksize(&attributes, STACK_BYTES) == 0);
+        CHECK(pthread_create(&thread, &attributes, use, &asked[round]) == 0);
+        CHECK(pthread_attr_destroy(&attributes) == 0);
         CHECK(pthread_join(thread, NULL) == 0);
         CHECK(threads_left(1) == 1);
     }

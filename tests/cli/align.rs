@@ -16,7 +16,7 @@ fn centers() -> serde_json::Map<String, serde_json::Value> {
 }
 
 /// The sample's surface: what its depth maps show of the right side, and its mirror image.
-fn write_scan(path: &Path) {
+pub(crate) fn write_scan(path: &Path) {
     let scene = vg::io::open_scene(&sample(), &vg::io::SceneOptions::default()).unwrap().scene;
     let mut points = Vec::new();
     for view in &scene.views {

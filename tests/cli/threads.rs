@@ -12,7 +12,7 @@ const COMMANDS: [&str; 8] = [
     "render {}/a.ply --turntable 2 --size 64x48 --background transparent -o {}/t",
     "eval . --prior hull --resolution 0.2 --json {}/e.json",
     "report . --views 000 --prior hull --resolution 0.2 -o {}/page.html",
-    "align . --box 4.63,1.89,1.45 --heading forward -o {}/v.json",
+    "align . --scan {}/scan.ply -o {}/v.json",
 ];
 
 /// Runs a command where at most `allowed` threads can be started.
@@ -38,6 +38,7 @@ fn one_thread_is_the_programs_own_and_three_are_three() {
     }
     let folder = scratch();
     let at = folder.path();
+    crate::align::write_scan(&at.join("scan.ply"));
     let mut bytes = Vec::new();
     for (threads, allowed) in [(1, 0), (3, 3)] {
         for words in COMMANDS {
@@ -59,6 +60,7 @@ fn threads_that_cannot_start_are_one_error_that_says_the_way_out() {
     }
     let folder = scratch();
     let at = folder.path();
+    crate::align::write_scan(&at.join("scan.ply"));
     let words = "reconstruct . --views 000,001 --resolution 0.2 -o {}/a.ply --threads 1";
     assert_eq!(vg_where_few_start(at, words, 0).code, 0);
     let cause = "threads: 2 of 3 could be started: Resource temporarily unavailable (os error 11); raise the system's \
