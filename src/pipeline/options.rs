@@ -98,10 +98,9 @@ pub struct Options {
     pub resolution: f64,
     /// Most views to use; those are kept that spread best around the vehicle.
     pub max_views: Option<usize>,
-    /// Most Gaussians that the vehicle pixels of the used views and their mirror images may be able to become; `None` means
-    /// any number. Where they could become more, the views are resampled to fewer pixels and the report says so: decided
-    /// from the masks before the work. A model usually has a half to a tenth of that. A refinement that densifies adds to
-    /// it, and a baseline does not look at it.
+    /// Most Gaussians that the model may have by what the masks of the used views say of its size, see
+    /// [`cap`](super::cap); `None` means any number. Where they allow for more, the views are resampled to fewer pixels
+    /// before the work, and the report says so. A refinement that densifies adds to it, and a baseline does not look at it.
     pub max_gaussians: Option<usize>,
     /// Worker threads; 0 means one per core.
     pub threads: usize,

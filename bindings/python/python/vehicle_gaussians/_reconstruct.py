@@ -97,8 +97,8 @@ def reconstruct(
     resolution: the share of their width and height to which the views are resampled first, above 0, at most 1; a budget
     may choose less.
     max_views: use at most this many views, those that spread best around the vehicle; a budget may choose fewer.
-    max_gaussians: most Gaussians that the vehicle's pixels and their mirror images may be able to become; where they
-    could become more, the views are resampled to fewer pixels, and the report's left_out says so. None: any number.
+    max_gaussians: most Gaussians that the model may have by what the masks say of its size; where they allow for more,
+    the views are resampled to fewer pixels, and the report's left_out says so. None: any number.
     refine_iterations, refine_seconds: optimise the model against the photographs, by so many steps, or by as many as fit
     into about so many seconds; the report tells how many that were. Beside a budget, not within it.
     refine_hold_out: one of three or more views takes no part in that and tells when to stop.

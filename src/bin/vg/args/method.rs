@@ -67,8 +67,8 @@ pub(crate) struct MethodArgs {
     /// Use at most this many views, those that spread best around the vehicle
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     max_views: Option<usize>,
-    /// At most so many Gaussians may the vehicle's pixels and their mirror images be able to become; where they could
-    /// become more, the views are resampled to fewer pixels
+    /// Most Gaussians that the model may have by what the masks say of its size; where they allow for more, the views are
+    /// resampled to fewer pixels
     #[arg(long, value_name = "N", default_value_t = DEFAULT_MAX_GAUSSIANS, value_parser = at_least_one)]
     max_gaussians: usize,
     /// Optimise the model against the photographs: so many steps (300), or as many as fit into so many seconds (5s)
