@@ -1716,7 +1716,7 @@ inline Result<cv::Mat> segment(const Model &model, LentMat photograph, const vg_
 inline Result<vg_image> mask(LentMat mat) {
     static constexpr detail::MatFormat formats[] = {{CV_8UC1, VG_FORMAT_GRAY8}};
     return detail::lent("mask", mat.get(), formats,
-                        "CV_8UC1, 128 and above is vehicle, or 1 of 0 and 1 (of floats 0 to 1: mat.convertTo(mask, CV_8U, 255))");
+                        "CV_8UC1, 128 and above is vehicle, or 1 of 0 and 1 (of 0 to 1: mat.convertTo(mask, CV_8U, 255))");
 }
 
 /// Planar depth in metres.

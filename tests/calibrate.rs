@@ -169,8 +169,10 @@ fn views_without_masks_are_calibrated_by_the_outlines_of_their_depth() {
     let mut scene = open(&INPUTS, true).unwrap();
     scene.views.iter_mut().for_each(|v| v.mask = None);
     let made = run(&scene, &Options { prior: PriorChoice::Given, ..options(Calibrate::Auto) }).unwrap();
-    let masked =
-        run(&open(&INPUTS, true).unwrap(), &Options { prior: PriorChoice::Given, ..options(Calibrate::Auto) });
+    let masked = run(
+        &open(&INPUTS, true).unwrap(),
+        &Options { prior: PriorChoice::Given, ..options(Calibrate::Auto) },
+    );
     let (found, expected) = (made.report.calibration.unwrap(), masked.unwrap().report.calibration.unwrap());
     assert_eq!(found.verdict, expected.verdict);
     assert!((found.coverage_before - expected.coverage_before).abs() < 0.01);

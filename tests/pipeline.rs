@@ -343,7 +343,8 @@ fn the_report_is_json_with_the_promised_keys() {
         "settings",
         "prior",
         "head",
-        "box",
+        "vehicle",
+        "working_box",
         "input_error_by_given_cameras",
         "input_views",
         "verdict",
@@ -358,7 +359,7 @@ fn the_report_is_json_with_the_promised_keys() {
     assert_eq!(json["symmetry"]["mode"], "auto");
     assert_eq!(json["symmetry"]["reference_side"], "right");
     assert!(json["symmetry"]["cloned"].as_u64().unwrap() > 0);
-    assert_eq!(json["box"]["source"], "estimated");
+    assert_eq!(json["working_box"]["source"], "estimated");
     assert_eq!(report.views_used, ["-40", "-75", "-105", "-140"]);
 }
 
@@ -472,7 +473,7 @@ fn depth_that_a_resize_mixed_at_its_edges_makes_no_larger_vehicle() {
         for k in 0..3 {
             assert!((found[k] - expected[k]).abs() < 0.3, "{behind}: {found:?} for {expected:?}");
         }
-        assert!((0..3).any(|k| unguarded[k] > expected[k] + 1.0), "{behind}: {unguarded:?}");
+        assert!((0..3).any(|k| unguarded[k] > expected[k] + 0.5), "{behind}: {unguarded:?}");
     }
 }
 

@@ -26,6 +26,9 @@ const STRAY_SHARE: f64 = 0.005;
 /// and by no more does a mask's error move its edge.
 const DENIED_M: f32 = 0.25;
 
+/// Part of the depth that silhouettes may deny.
+const MOST_DENIED: f64 = 0.5;
+
 /// What speaks against a depth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Doubt {
@@ -131,7 +134,23 @@ fn patches(set: &[bool], z: &[f32], width: usize) -> Vec<Vec<usize>> {
 }
 
 /// What the other views' silhouettes tell. One alone may be cut by something before the vehicle.
+///
+/// Where they deny most of the depth, it is of another unit or another frame, and no pixel is to blame: all of it stays,
+/// for the verdict to tell.
 fn deny(views: &[View], depths: &[DepthMap], doubts: &mut [Vec<Doubt>]) {
+    let before = doubts.to_vec();
+    deny_pixels(views, depths, doubts);
+    let all = doubts.iter().flatten();
+    let (denied, measured) =
+        all.zip(depths.iter().flat_map(DepthMap::depth)).fold((0, 0), |(d, m), (doubt, z)| {
+            (d + usize::from(*doubt == Doubt::Denied), m + usize::from(*z > 0.0 && *doubt != Doubt::Floating))
+        });
+    if denied as f64 > MOST_DENIED * measured as f64 {
+        doubts.clone_from_slice(&before);
+    }
+}
+
+fn deny_pixels(views: &[View], depths: &[DepthMap], doubts: &mut [Vec<Doubt>]) {
     let shows = |view: &View| view.mask.as_ref().is_some_and(|m| m.vehicle_pixels() > 0);
     let silhouettes: Vec<Option<Silhouette>> =
         views.par_iter().map(|view| shows(view).then(|| Silhouette::new(view))).collect();

@@ -432,7 +432,11 @@ void pictures_own_their_pixels(const vg::Gaussians &car) {
     on_cpu.backend = VG_BACKEND_CPU;
     const vg::Renderer ready = vg::Renderer::make(car, on_cpu).take();
     CHECK(ready.backend() == VG_BACKEND_CPU && std::string(ready.choice()).find("asked for") != std::string::npos);
-    const vg_image_target both[] = {target, target};
+    // What one call writes may not overlap.
+    std::vector<float> others(metres.size());
+    vg::ImageTarget other = target;
+    other.depth = others.data();
+    const vg_image_target both[] = {target, other};
     const vg_camera from_both[] = {camera, camera};
     CHECK(ready.render_into(both, from_both, 2, with_context).ok() && ready.render_into(target, camera).ok());
     CHECK(failed(ready.render_into(nullptr, nullptr, 0), VG_STATUS_ARGUMENT, "count"));
