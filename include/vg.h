@@ -1138,10 +1138,10 @@ typedef struct vg_options {
      */
     double *progress_overall;
     /**
-     * Most Gaussians that the vehicle pixels of the used views and their mirror images may be able to become; 0: any
-     * number. Where they could become more, the views are resampled to fewer pixels, decided from the masks before the
-     * work, and the log and the report say so. A model usually has a half to a tenth of that. Default 12000000, whose PLY
-     * file would have 2 GB.
+     * Most Gaussians that the model may have by what the masks of the used views say of its size: twice their vehicle
+     * pixels, or six times those of the largest mask, whichever is less. Where that is more, the views are resampled to
+     * fewer pixels before the work, and the log and the report say so. 0: any number. Default 12000000, whose PLY file
+     * would have 2 GB.
      */
     size_t max_gaussians;
 } vg_options;

@@ -140,11 +140,17 @@ fn patches(set: &[bool], z: &[f32], width: usize) -> Vec<Vec<usize>> {
 fn deny(views: &[View], depths: &[DepthMap], doubts: &mut [Vec<Doubt>]) {
     let before = doubts.to_vec();
     deny_pixels(views, depths, doubts);
-    let all = doubts.iter().flatten();
-    let (denied, measured) =
-        all.zip(depths.iter().flat_map(DepthMap::depth)).fold((0, 0), |(d, m), (doubt, z)| {
-            (d + usize::from(*doubt == Doubt::Denied), m + usize::from(*z > 0.0 && *doubt != Doubt::Floating))
-        });
+    let of_vehicle = |view: &View, pixel: usize| {
+        view.mask.as_ref().is_none_or(|mask| mask.labels()[pixel] == Label::Vehicle)
+    };
+    let (mut denied, mut measured) = (0usize, 0usize);
+    for ((view, depth), doubts) in views.iter().zip(depths).zip(&*doubts) {
+        for (pixel, doubt) in doubts.iter().enumerate() {
+            let is_measured = depth.depth()[pixel] > 0.0 && of_vehicle(view, pixel);
+            measured += usize::from(is_measured && matches!(doubt, Doubt::None | Doubt::Denied));
+            denied += usize::from(*doubt == Doubt::Denied);
+        }
+    }
     if denied as f64 > MOST_DENIED * measured as f64 {
         doubts.clone_from_slice(&before);
     }

@@ -11,7 +11,7 @@ const TABLE: &[(&[&str], i32)] = &[
     (&["reconstruct", "", "-o", "x"], 2),
     (&["reconstruct", ".", "-o", ""], 2),
     (&["reconstruct", ".", "--views", "", "-o", "/dev/null"], 2),
-    (&["reconstruct", ".", "--views", "000,,001", "-o", "/dev/null"], 1),
+    (&["reconstruct", ".", "--views", "000,,001", "-o", "/dev/null"], 2),
     (&["reconstruct", ".", "--views", "../../../etc/passwd", "-o", "/dev/null"], 1),
     (&["reconstruct", "line\nbreak\u{1b}[31m", "-o", "x"], 1),
     (&["reconstruct", ".", "--views", "a\nb", "-o", "/dev/null"], 1),

@@ -44,6 +44,7 @@ def test_the_overall_fraction_grows_from_0_to_1_through_all_stages(face: Any, el
     assert len({round(part, 2) for part in overall}) > 8
 
 
+@pytest.mark.filterwarnings("ignore:(bad|doubtful):vehicle_gaussians.VgWarning")
 @pytest.mark.parametrize("face", FACES)
 @pytest.mark.parametrize("answer", [None, True, 0, 1, "stop", np.False_, np.True_])
 def test_only_false_itself_cancels(face: Any, answer: object, ellipsoid: Views) -> None:

@@ -41,6 +41,7 @@ def test_depth_that_one_view_lacks_bends_the_shape_and_warns_of_the_callers_line
     assert errors[0] < 0.7 * errors[1], errors
 
 
+@pytest.mark.filterwarnings("ignore:(bad|doubtful):vehicle_gaussians.VgWarning")
 @pytest.mark.parametrize("face", FACES)
 def test_a_budget_that_was_not_kept_warns(face: Any, ellipsoid: Views) -> None:
     views = (ellipsoid.images, ellipsoid.masks, ellipsoid.cameras)
@@ -48,8 +49,10 @@ def test_a_budget_that_was_not_kept_warns(face: Any, ellipsoid: Views) -> None:
         vg.VgWarning, match=r"^budget: 0\.0001 s was not kept: the call took \d+\.\d\d s, though all"
     ) as caught:
         made = face.reconstruct(*views, budget=1e-4)
-    assert [warning.filename for warning in caught] == [__file__]
-    assert [str(warning.message) for warning in caught] == made.report["warnings"]
+    # A model of one coarse view is not believed either, and that is said too.
+    assert {warning.filename for warning in caught} == {__file__}
+    told = [str(warning.message) for warning in caught]
+    assert [text for text in told if not text.startswith(("bad: ", "doubtful: "))] == made.report["warnings"]
 
 
 @pytest.mark.parametrize("face", FACES)
