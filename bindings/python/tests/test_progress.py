@@ -68,6 +68,7 @@ def test_false_cancels_where_it_is_returned(face: Any, ellipsoid: Views) -> None
     assert told[-1] == "head"
 
 
+@pytest.mark.filterwarnings("ignore:(bad|doubtful):vehicle_gaussians.VgWarning")
 @pytest.mark.parametrize("face", FACES)
 def test_a_third_parameter_with_a_default_is_the_callers_own(face: Any, ellipsoid: Views) -> None:
     mine: list[float] = []
