@@ -74,7 +74,7 @@ fn picture(decoded: DynamicImage) -> Result<Picture> {
     Ok(Picture { image: RgbImage::from_owner("image", width, height, rgb.into_raw())?, alpha })
 }
 
-/// The mask in a PNG, JPEG or NumPy file; see [`super::mask`] for what is vehicle in it.
+/// The mask in a PNG, JPEG or NumPy file; docs/SCENES.md says what is vehicle in it.
 pub fn read_mask(path: &Path) -> Result<Mask> {
     mask::decode(&read_limited(path, MAX_FILE)?, path, None)
 }
