@@ -21,7 +21,7 @@ fn a_runtime_that_cannot_be_used_is_said_with_what_to_install() {
     let path = file("program");
     graph.write(&path);
     let (sample, path) = (sample(), path.to_str().unwrap().to_owned());
-    let out = file("never.ply");
+    let out = file("never").with_extension("ply");
     for (runtime, expected) in [
         ("/nowhere/libonnxruntime.so", "/nowhere/libonnxruntime.so does not exist"),
         ("/", "no libonnxruntime in /"),
