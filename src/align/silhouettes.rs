@@ -359,7 +359,7 @@ pub(super) fn fine(
 pub(super) struct Misses {
     /// Mean over all pieces of edge, pixels; where no point is near, the reach.
     pub(super) mean_px: f64,
-    /// The same over the pieces that look out into the open, which can be compared whatever the structure.
+    /// Mean over the pieces that look out into the open, which can be compared whatever the structure, pixels.
     pub(super) open_px: f64,
     /// Median, metres at the point's distance; infinite where most have no point near.
     pub(super) median_m: f64,

@@ -69,7 +69,7 @@ pub(crate) struct Moved {
 }
 
 impl Moved {
-    /// The same for views that were brought into the frame of a box that stands elsewhere: back means out of it.
+    /// Views that were brought into the frame of a box that stands elsewhere, with the way back out of it.
     pub(crate) fn out_of_box(moved: Option<Self>, in_box: &[View], vehicle_from_box: &Pose) -> Self {
         let mut moved = moved.unwrap_or_else(|| Self {
             views: in_box.to_vec(),

@@ -10,13 +10,13 @@ const STRAYS: f64 = 2e-4;
 /// Error of an end that was measured as depth, metres: a pixel's footprint and the noise of a scan.
 const MEASURED_M: f64 = 0.02;
 
-/// What two outer mirrors, which an estimated surface often lacks, are worth of the width, metres.
+/// Width of two outer mirrors, which an estimated surface often lacks, metres.
 const MIRRORS_M: f64 = 0.2;
 
 /// How long, wide and high the vehicle is.
 ///
-/// Of a surface that was estimated it is that surface's, which is closed also where no view looked; of depth that was
-/// measured, that of the Gaussians. Outer mirrors are thin, and often missing from both: then the width is the body's.
+/// An estimated surface is measured whole, which is closed also where no view looked; measured depth by its
+/// Gaussians. Outer mirrors are thin, and often missing from both: then the width is the body's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct VehicleSize {
     /// Length, width, height, metres.
