@@ -9,17 +9,14 @@
 //! The loss is the mean square of colour, alpha and depth, whose gradient takes part of a millisecond. The forward pass
 //! alone stands beside it. Processor time is what can be compared on a busy machine.
 
-#[path = "../tests/common/mod.rs"]
-mod common;
-
-use common::timing::{cpu_time, median, ms};
-use common::{Random, scenes};
 use glam::DVec3;
 use std::time::{Duration, Instant};
 use vg::render::cpu::GradientTimes;
 use vg::render::loss::{self, Structure, Term};
 use vg::render::{CpuRenderer, Gradients, PictureGradient, RenderOptions, Rendered, Renderer};
 use vg::{Camera, Gaussians};
+use vg_testing::timing::{cpu_time, median, ms};
+use vg_testing::{Random, scenes};
 
 const RUNS: usize = 40;
 

@@ -5,20 +5,17 @@
 // The bench is a caller of C functions.
 #![allow(unsafe_code)]
 
-#[path = "../tests/common/mod.rs"]
-mod common;
-
-use common::sample::{self, INPUTS};
 use std::ffi::c_void;
 use std::ops::ControlFlow;
 use std::ptr::{null, null_mut};
 use std::time::Instant;
-use vg::capi::*;
 use vg::pipeline::{Options, reconstruct_on};
 use vg::progress::Threads;
 use vg::render::{CpuRenderer, RenderOptions, Rendered};
 use vg::scene::PixelFormat;
 use vg::scene::mask::VEHICLE_THRESHOLD;
+use vg_face::capi::*;
+use vg_testing::sample::{self, INPUTS};
 
 const THREADS: u32 = 2;
 

@@ -4,10 +4,6 @@
 //! `--svg FILE` draws the curve, `--runs N` measures more often. `--stages` prints instead what each stage costs on
 //! one thread, from which the constants of the cost model are taken.
 
-#[path = "../tests/common/mod.rs"]
-mod common;
-
-use common::sample::{self, INPUTS, UNSEEN, errors, median};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::ops::ControlFlow;
@@ -17,6 +13,7 @@ use vg::io::{SceneOptions, open_scene};
 use vg::pipeline::{Options, Reconstruction, reconstruct_on};
 use vg::progress::Threads;
 use vg::{Error, Result, Scene};
+use vg_testing::sample::{self, INPUTS, UNSEEN, errors, median};
 
 /// Seconds.
 const BUDGETS: [f64; 8] = [0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0, 10.0];

@@ -9,13 +9,6 @@
 //! `benches/gpu_vs_gsplat` runs it with gsplat's CUDA kernels beside, where there is an NVIDIA GPU. Both draw the same
 //! picture in turns in one run. `WGPU_ADAPTER_NAME` chooses among several adapters.
 
-#[path = "../tests/common/mod.rs"]
-mod common;
-
-use common::gradients::{largest, noise, tensors};
-use common::scenes::{looking_at_origin, surfel_car};
-use common::timing::{median, ms};
-use common::{compare, scenes};
 use glam::DVec3;
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -24,6 +17,10 @@ use vg::render::{
     Rendered, Renderer, Rgba8,
 };
 use vg::{Camera, Gaussians};
+use vg_testing::gradients::{largest, noise, tensors};
+use vg_testing::scenes::{looking_at_origin, surfel_car};
+use vg_testing::timing::{median, ms};
+use vg_testing::{compare, scenes};
 
 /// Gaussians of the scene whose error is measured: 4e9 pixel-Gaussian pairs for the reference.
 const ERROR_GAUSSIANS: usize = 20_000;

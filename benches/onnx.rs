@@ -4,10 +4,6 @@
 //! `cargo bench --features onnx --bench onnx -- HEAD.onnx PYTHON`: a Gaussian head (`training/head/export.py` makes one),
 //! and a Python with NumPy and onnxruntime, whose library is used here too. Two threads, the bundled sample's four views.
 
-#[path = "../tests/common/mod.rs"]
-mod common;
-
-use common::sample::{self, INPUTS, median};
 use std::io::{BufRead, BufReader, Write};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -17,6 +13,7 @@ use vg::onnx::{Input, Model, ModelOptions};
 use vg::pipeline::{Options, reconstruct_on};
 use vg::progress::Threads;
 use vg::{Error, Result};
+use vg_testing::sample::{self, INPUTS, median};
 
 const THREADS: usize = 2;
 const ROUNDS: usize = 9;

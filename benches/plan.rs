@@ -2,14 +2,11 @@
 //! a scene made from the bundled sample in which it fires. `cargo bench --bench plan` prints the table of
 //! docs/PLAN.md.
 
-#[path = "../tests/common/mod.rs"]
-mod common;
-
-use common::sample::{self, INPUTS, UNSEEN, errors, median, run};
 use vg::pipeline::{Keep, Options, PriorChoice};
 use vg::scene::DepthMap;
 use vg::symmetry::SymmetryMode;
 use vg::{Result, Scene};
+use vg_testing::sample::{self, INPUTS, UNSEEN, errors, median, run};
 
 /// Timed runs of each setting, after one that is not timed.
 const RUNS: usize = 7;
@@ -88,7 +85,7 @@ fn main() -> Result<()> {
 
 /// One pixel in a hundred moved by up to a metre, as depth cameras do at edges.
 fn floating(mut scene: Scene) -> Result<Scene> {
-    let mut random = common::Random::new(7);
+    let mut random = vg_testing::Random::new(7);
     for view in &mut scene.views {
         let depth = view.depth.as_ref().expect("the inputs have depth");
         let (width, height) = (depth.width(), depth.height());

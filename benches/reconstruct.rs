@@ -3,13 +3,10 @@
 //! `cargo bench --bench reconstruct` prints one row per depth source and number of threads: medians over the runs,
 //! what part of the whole the cloning takes, and the highest memory of the process during these runs.
 
-#[path = "../tests/common/mod.rs"]
-mod common;
-
-use common::sample::{self, INPUTS, UNSEEN, errors, median, run};
 use vg::pipeline::{Options, PriorChoice, Report};
 use vg::symmetry::SymmetryMode;
 use vg::{Result, Scene};
+use vg_testing::sample::{self, INPUTS, UNSEEN, errors, median, run};
 
 /// Timed runs of each setting, after one that is not timed.
 const RUNS: usize = 7;

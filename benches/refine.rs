@@ -14,14 +14,10 @@
 //! exposures; OpenSplat's keep gradients of splat centres, and move SH bands above 0 once in 16 steps.
 
 #[allow(dead_code, unused_imports)] // of density control and of its tests, which are not here
-#[path = "../src/refine/adam.rs"]
+#[path = "../crates/vehicle-gaussians/src/refine/adam.rs"]
 mod adam; // what the library itself moves parameters by
-#[path = "../tests/common/mod.rs"]
-mod common;
 
 use adam::Adam;
-use common::timing::cpu_time;
-use common::{Random, scenes};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::fs::{read, write};
@@ -33,6 +29,8 @@ use vg::refine::{Rates, RefineOptions};
 use vg::render::loss::{self, Structure, Term};
 use vg::render::{Background, CpuRenderer, Gradients, PictureGradient, RenderOptions, Rendered, Renderer};
 use vg::{Camera, Error, Gaussians, Result, io};
+use vg_testing::timing::cpu_time;
+use vg_testing::{Random, scenes};
 
 const GAUSSIANS: usize = 100_000;
 const SIZE: [u32; 2] = [512, 384];
@@ -161,7 +159,7 @@ fn compare(ours: &mut Ours, theirs: &mut Theirs, folder: &Path) -> Result<()> {
     let here = ours.descend(0)?;
     let picture = numbers("picture.f32");
     let colors = ours.picture.color.as_flattened().iter().zip(&picture);
-    let off = common::difference(colors.map(|(a, b)| (a.min(1.0).into(), (*b).into())));
+    let off = vg_testing::difference(colors.map(|(a, b)| (a.min(1.0).into(), (*b).into())));
     println!("loss {here:.6} and {loss:.6}; pictures differ by {:.1e}, at most {:.1e}", off.mean, off.max);
     let apart = |name: &str| {
         let there = numbers(name);
@@ -402,7 +400,7 @@ impl Theirs {
         io::ply::write(&folder.join("start.ply"), &ours.start)?;
         write(folder.join("job.json"), job.to_string()).expect("a file");
         write(folder.join("targets.f32"), targets).expect("a file");
-        let program = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/peers/opensplat.py");
+        let program = vg_testing::root().join("benches/peers/opensplat.py");
         let mut child = Command::new(python)
             .arg(program)
             .arg(checkout)

@@ -9,17 +9,14 @@
 //! Wall time is what a user waits for, processor time is what can be compared on a busy machine. The error of
 //! the same code against the f64 reference, on a scene small enough for brute force, stands beside them.
 
-#[path = "../tests/common/mod.rs"]
-mod common;
-
-use common::scenes::surfel_car;
-use common::timing::{cpu_time, median, ms};
-use common::{compare, scenes};
 use glam::DVec3;
 use std::time::{Duration, Instant};
 use vg::render::cpu::StageTimes;
 use vg::render::{CpuRenderer, Reference, RenderOptions, Rendered, Renderer};
 use vg::{Camera, Gaussians};
+use vg_testing::scenes::surfel_car;
+use vg_testing::timing::{cpu_time, median, ms};
+use vg_testing::{compare, scenes};
 
 /// Gaussians of the scene whose error is measured: 4e9 pixel-Gaussian pairs for the reference.
 const ERROR_GAUSSIANS: usize = 20_000;

@@ -5,11 +5,6 @@
 //! with a `split.json` of one or more keys; `--only NAME,NAME` some of them, `--prior NAME,NAME` other priors than the
 //! hull, `--case TEXT` the rows with TEXT in their name. Prints a Markdown table per prior: PSNR in dB / silhouette IoU / mean absolute depth error in m.
 
-#[path = "../tests/common/mod.rs"]
-mod common;
-
-use common::Random;
-use common::sample::{errors, run};
 use glam::{DMat3, DQuat, DVec3};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,6 +16,8 @@ use vg::scene::Mask;
 use vg::scene::mask::Label;
 use vg::symmetry::SymmetryMode;
 use vg::{Error, Result, Scene};
+use vg_testing::Random;
+use vg_testing::sample::{errors, run};
 
 fn main() -> Result<()> {
     let arguments = Arguments::read()?;
@@ -315,7 +312,7 @@ impl Arguments {
 
     fn folders(&self) -> Result<Vec<PathBuf>> {
         let Some(folder) = &self.folder else {
-            return Ok(vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/sedan")]);
+            return Ok(vec![vg_testing::root().join("tests/data/sedan")]);
         };
         let listed = std::fs::read_dir(folder)
             .map_err(|e| Error::argument(folder.display().to_string(), e.to_string(), "a folder"))?;

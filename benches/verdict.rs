@@ -8,11 +8,6 @@
 //! PSNR on the unseen side. `--figures FILE` writes all evidence, a JSON object a line. Exit code 1 if a good scene is called bad, or a
 //! bad one good.
 
-#[path = "../tests/common/mod.rs"]
-mod common;
-
-use common::Random;
-use common::sample::{errors, run};
 use glam::{DMat3, DQuat, DVec3};
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -24,6 +19,8 @@ use vg::pipeline::{Options, Verdict};
 use vg::scene::mask::Label;
 use vg::scene::{DepthMap, Mask};
 use vg::{Error, Result, Scene, View};
+use vg_testing::Random;
+use vg_testing::sample::{errors, run};
 
 fn main() -> Result<ExitCode> {
     let arguments = Arguments::read()?;
@@ -444,7 +441,7 @@ impl Arguments {
     }
 
     fn vehicles(&self) -> Result<Vec<Vehicle>> {
-        let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/sedan");
+        let sample = vg_testing::root().join("tests/data/sedan");
         let folders = if self.folders.is_empty() { vec![sample] } else { self.folders.clone() };
         let mut found = Vec::new();
         for folder in folders {

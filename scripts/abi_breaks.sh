@@ -18,7 +18,7 @@ unnoticed=0
 
 failing() {
     # Slow tests of behaviour are left out; the client is enough to tell.
-    { cargo test --lib capi 2>&1; cargo test --test abi -- --skip valgrind --skip arguments --skip compiles_clean 2>&1; } |
+    { cargo test --package libvg --lib 2>&1; cargo test --package libvg --test abi -- --skip valgrind --skip arguments --skip compiles_clean 2>&1; } |
         sed -n 's/^test \(.*\) \.\.\. FAILED$/    \1/p; s/^error\[\(.*\)/    does not compile: \1/p' || true
 }
 

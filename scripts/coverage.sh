@@ -29,10 +29,10 @@ profiles=$(mktemp -d)
 trap 'rm -rf "$profiles"' EXIT
 export LLVM_PROFILE_FILE=$profiles/%p-%m.profraw RUSTFLAGS="-Cinstrument-coverage"
 
-cargo test --locked --lib capi::
-cargo test --locked --test abi
-objects=$(cargo test --locked --lib --test abi --no-run 2>&1 | sed -n 's/.*(\(.*\))$/--object \1/p')
-objects+=" --object $CARGO_TARGET_DIR/debug/deps/libvg.so"
+cargo test --locked --package libvg --lib
+cargo test --locked --package libvg --test abi
+objects=$(cargo test --locked --package libvg --lib --test abi --no-run 2>&1 | sed -n 's/.*(\(.*\))$/--object \1/p')
+objects+=" --object $CARGO_TARGET_DIR/debug/libvg.so"
 
 "$profdata" merge --sparse "$profiles"/*.profraw -o "$profiles/all.profdata"
 # shellcheck disable=SC2086

@@ -3,8 +3,7 @@
 
     python3 scripts/licenses.py                 writes LICENSES-THIRD-PARTY
     python3 scripts/licenses.py --check         says what is out of date, and fails, if it is
-    python3 scripts/licenses.py --manifest-path bindings/python/Cargo.toml --default-features \\
-        --output bindings/python/LICENSES-THIRD-PARTY
+    python3 scripts/licenses.py --package vehicle-gaussians-python --output bindings/python/LICENSES-THIRD-PARTY
 
 Crates that only run while building (procedural macros, build scripts) are not listed. Where a crate offers a
 choice of licences, one is taken: the first in PREFERRED. A crate without a text of its licence gets that of another
@@ -48,7 +47,7 @@ PREFERRED = list(MARKS)
 RULE = "=" * 78
 
 HEAD = """\
-Third-party software in binaries of {name}
+Third-party software in binaries of vehicle-gaussians
 
 {what}
 contains the Rust crates listed here, each under the licence named beside it;
@@ -57,7 +56,7 @@ Rust Project Contributors, under the MIT licence, whose terms are among the
 texts; notices for its parts come with each Rust toolchain
 (share/doc/rust/COPYRIGHT-library.html).
 
-The licence of {name} itself is in LICENSE-MIT and LICENSE-APACHE.
+The licence of vehicle-gaussians itself is in LICENSE-MIT and LICENSE-APACHE.
 
 Made by scripts/licenses.py from Cargo.lock. Do not edit.
 """
@@ -82,9 +81,7 @@ def linked(args):
 
 
 def selection(args):
-    chosen = [f"--manifest-path={args.manifest_path}"]
-    if not args.default_features:
-        chosen.append("--no-default-features")
+    chosen = [f"--package={args.package}"]
     if args.features:
         chosen.append(f"--features={args.features}")
     return chosen
@@ -196,19 +193,15 @@ def collect(packages):
 
 
 def make(args):
-    listed = json.loads(cargo("metadata", "--format-version=1", "--locked", *selection(args)))
-    if listed["resolve"]["root"] is None:
-        sys.exit(f"licenses.py: {args.manifest_path} is not a package's manifest")
-    root = next(p for p in listed["packages"] if p["id"] == listed["resolve"]["root"])
+    listed = json.loads(cargo("metadata", "--format-version=1", "--locked", "--all-features"))
     wanted = linked(args)
     # Path dependencies are our own.
     packages = [p for p in listed["packages"] if p["source"] and (p["name"], p["version"]) in wanted]
     packages.sort(key=lambda p: (p["name"], p["version"]))
     rows, users = collect(packages)
 
-    features = ", ".join(filter(None, ["default" if args.default_features else "", args.features]))
-    what = f"A binary with features {features}" if features else "A binary of the library without optional features"
-    out = [HEAD.format(name=root["name"], what=what), "\n"]
+    what = f"A binary with features {args.features}" if args.features else "A binary without optional features"
+    out = [HEAD.format(what=what), "\n"]
     width = max(len(name) for name, _ in rows)
     out += [f"{name:{width}}  {licences}\n" for name, licences in rows]
     order = sorted(users.items(), key=lambda item: (PREFERRED + ["Notice"]).index(item[0][0]))
@@ -220,14 +213,13 @@ def make(args):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--manifest-path", default=ROOT / "Cargo.toml", type=Path)
-    parser.add_argument("--output", type=Path, help="LICENSES-THIRD-PARTY beside the manifest if not given")
-    parser.add_argument("--default-features", action="store_true", help="off if not given")
+    parser.add_argument("--package", default="libvg", help="of the workspace; the C library if not given")
+    parser.add_argument("--output", default=ROOT / "LICENSES-THIRD-PARTY", type=Path)
     parser.add_argument("--features", help="separated by commas")
     parser.add_argument("--target", action="append", help="may be repeated; Linux on x86-64 and ARM if not given")
     parser.add_argument("--check", action="store_true", help="write nothing; fail if the file is out of date")
     args = parser.parse_args()
-    output = args.output or args.manifest_path.parent / "LICENSES-THIRD-PARTY"
+    output = args.output
 
     text = make(args)
     if not args.check:

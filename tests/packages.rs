@@ -7,12 +7,6 @@
 
 #![cfg(target_os = "linux")]
 
-mod common;
-#[path = "abi/tools.rs"]
-mod tools;
-
-use crate::common::sample::{INPUTS, UNSEEN, open};
-use crate::tools::{STRICT, cc, cxx, have, output, root, run, say, scratch, target};
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -21,6 +15,9 @@ use std::sync::{Arc, Mutex, Weak};
 use vg::metrics::{ViewErrors, on_white, psnr};
 use vg::render::{CpuRenderer, RenderOptions, Renderer};
 use vg::{Scene, io};
+use vg_testing::sample::{INPUTS, UNSEEN, open};
+use vg_testing::tools::{STRICT, cc, cxx, have, output, run, scratch, target};
+use vg_testing::{root, say};
 
 // ---- The package
 
@@ -333,7 +330,7 @@ fn strict(compiler: &str, standard: &str, system: &[String]) -> Command {
 /// Compiles and runs a test in C++ with the library that cargo built beside this one.
 fn run_test(mut compile: Command, sources: &[&str], libraries: &[String]) {
     let folder = scratch();
-    crate::tools::library_folder(folder.path());
+    vg_testing::tools::library_folder(folder.path());
     let test = folder.path().join("test");
     compile.args(sources.iter().map(|name| test_source(name))).arg("-o").arg(&test);
     compile.arg("-L").arg(folder.path()).arg(format!("-Wl,-rpath,{}", folder.path().display()));
@@ -407,7 +404,7 @@ fn the_examples_in_vg_hpp_compile_and_say_why_they_made_nothing() {
     assert_eq!(examples.len(), 2, "{examples:?}");
     for example in examples {
         let folder = scratch();
-        crate::tools::library_folder(folder.path());
+        vg_testing::tools::library_folder(folder.path());
         let (source, test) = (folder.path().join("example.cpp"), folder.path().join("example"));
         std::fs::write(&source, &example).unwrap();
         let mut compile = strict(&cxx(), "c++17", &[]);

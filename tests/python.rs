@@ -3,16 +3,11 @@
 //!
 //! What this machine lacks is skipped with a printed reason; `VG_NO_SKIP=1` makes it a failure, but for PyTorch.
 
-#[path = "common/mod.rs"]
-mod common;
-#[path = "abi/tools.rs"]
-mod tools;
-
-use common::sample::{self, INPUTS};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 use vg::pipeline::Options;
+use vg_testing::sample::{self, INPUTS};
 
 /// Python with the package in it, or `None` where it cannot be had.
 fn python() -> Option<&'static Path> {
@@ -21,7 +16,7 @@ fn python() -> Option<&'static Path> {
 }
 
 fn installed() -> Option<PathBuf> {
-    let target = tools::target().parent()?.parent()?.to_owned();
+    let target = vg_testing::tools::target().parent()?.parent()?.to_owned();
     let environment = target.join("python");
     let python = environment.join("bin/python");
     // Debian's python3 without python3-venv leaves an environment without pip behind.
@@ -35,7 +30,8 @@ fn installed() -> Option<PathBuf> {
     let mut pip = Command::new(&python);
     pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "./bindings/python[test]"]);
     // The optimised dependencies of the demo and of this are the same.
-    let output = tools::output(pip.current_dir(tools::root()).env("CARGO_TARGET_DIR", &target));
+    let output =
+        vg_testing::tools::output(pip.current_dir(vg_testing::root()).env("CARGO_TARGET_DIR", &target));
     let errors = String::from_utf8_lossy(&output.stderr);
     if output.status.success() {
         return Some(python);
@@ -50,7 +46,7 @@ fn installed() -> Option<PathBuf> {
 fn lacking(what: &str) -> Option<PathBuf> {
     let line = format!("skipped: the Python package: {what}");
     assert!(std::env::var_os("VG_NO_SKIP").is_none(), "{line}");
-    tools::say(&line);
+    vg_testing::say(&line);
     None
 }
 
@@ -58,14 +54,14 @@ fn lacking(what: &str) -> Option<PathBuf> {
 fn the_python_package_passes_its_tests() {
     let Some(python) = python() else { return };
     let mut pytest = Command::new(python);
-    pytest.args(["-m", "pytest", "--quiet", "-rs", "bindings/python/tests"]).current_dir(tools::root());
-    let printed = tools::run(&mut pytest);
+    pytest.args(["-m", "pytest", "--quiet", "-rs", "bindings/python/tests"]).current_dir(vg_testing::root());
+    let printed = vg_testing::tools::run(&mut pytest);
     assert!(printed.contains(" passed"), "{printed}");
     for line in printed.lines().filter(|line| line.starts_with("SKIPPED")) {
         // Gigabytes that nothing else needs: not among the packages of the tests.
         let may_lack = line.ends_with("PyTorch is not installed");
         assert!(may_lack || std::env::var_os("VG_NO_SKIP").is_none(), "{line}");
-        tools::say(&format!("skipped: {line}"));
+        vg_testing::say(&format!("skipped: {line}"));
     }
 }
 
@@ -96,10 +92,14 @@ fn python_gets_the_bytes_of_rust_by_either_face() {
         ("opacities", g.opacities()),
         ("sh", g.sh()),
     ];
-    let folder = tools::scratch();
+    let folder = vg_testing::tools::scratch();
     let mut script = Command::new(python);
-    script.args(["-c", SCRIPT]).arg(tools::root().join("tests/data/sedan")).arg(folder.path()).args(INPUTS);
-    tools::run(&mut script);
+    script
+        .args(["-c", SCRIPT])
+        .arg(vg_testing::root().join("tests/data/sedan"))
+        .arg(folder.path())
+        .args(INPUTS);
+    vg_testing::tools::run(&mut script);
     for face in ["native", "ctypes"] {
         for (name, expected) in arrays {
             let bytes = std::fs::read(folder.path().join(format!("{face}.{name}"))).unwrap();

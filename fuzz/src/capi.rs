@@ -9,14 +9,11 @@ use std::cell::Cell;
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::path::Path;
 use std::ptr::null_mut;
-use vg::capi::*;
+use vg_face::capi::*;
 
 #[path = "../../tests/abi/arguments/calls.rs"]
 #[allow(dead_code)]
 mod calls;
-#[path = "../../tests/common/vehicle.rs"]
-#[allow(dead_code)]
-mod vehicle;
 
 /// None: the address sanitizer guards to the byte.
 pub(crate) const GUARD: usize = 0;
@@ -51,7 +48,7 @@ pub trait Source {
 /// What the calls are made with; the sample is in the repository, what is saved goes to `scratch`.
 pub fn world(scratch: &Path) -> World {
     std::fs::create_dir_all(scratch).expect("a folder to save in");
-    World::new(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/sedan"), scratch)
+    World::new(&vg_testing::root().join("tests/data/sedan"), scratch)
 }
 
 /// Up to three calls, each with what the ones before it made.
@@ -278,8 +275,10 @@ fn field<S: Source>(world: &World, call: &mut Call, i: usize, source: &mut S) {
         }
         // Pictures get their memory once all is decided; arrays and names may go.
         "image.data" | "mask.data" | "depth.data" | "color" | "depth" | "positions" | "scales"
-        | "rotations" | "opacities" | "sh" | "names" | "vehicle_from_world" | "alpha" | "background" | "pose"
-        | "view_matrix" if field.size == 8 => {
+        | "rotations" | "opacities" | "sh" | "names" | "vehicle_from_world" | "alpha" | "background"
+        | "pose" | "view_matrix"
+            if field.size == 8 =>
+        {
             if source.one_in(3) {
                 put(lent, 0);
             }
@@ -335,7 +334,9 @@ fn field<S: Source>(world: &World, call: &mut Call, i: usize, source: &mut S) {
 fn whole<S: Source>(call: &mut Call, world: &World, source: &mut S) -> bool {
     let (lent, camera) = match call.function {
         "vg_reconstruct" => ("views", "camera."),
-        "vg_render" | "vg_render_backward" | "vg_camera_project" | "vg_camera_scale" | "vg_camera_crop" => ("camera", ""),
+        "vg_render" | "vg_render_backward" | "vg_camera_project" | "vg_camera_scale" | "vg_camera_crop" => {
+            ("camera", "")
+        }
         "vg_gaussians_from_arrays" => return spoil(call, source),
         _ => return false,
     };

@@ -10,14 +10,14 @@ use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
 use super::view::vg_view;
 use super::watched::{Told, watched};
-use crate::align::{self, Heading};
-use crate::error::{Error, Result};
-use crate::geometry::Similarity;
-use crate::scene::View;
-use crate::scene::cloud::{Cloud, MAX_CLOUD_POINTS};
-use crate::scene::view::MAX_VIEWS;
 use glam::DVec3;
 use std::ffi::{c_char, c_void};
+use vg::align::{self, Heading};
+use vg::geometry::Similarity;
+use vg::scene::View;
+use vg::scene::cloud::{Cloud, MAX_CLOUD_POINTS};
+use vg::scene::view::MAX_VIEWS;
+use vg::{Error, Result};
 
 /// How front and back are told apart.
 #[repr(i32)]

@@ -3,11 +3,11 @@
 use super::guard::guarded;
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
-use crate::error::{Error, Result};
-use crate::geometry::camera::{CameraModel, OpenCvModel};
-use crate::geometry::distortion::Distortion;
-use crate::geometry::{Camera, Pose, Similarity, frame};
 use glam::DVec3;
+use vg::geometry::camera::{CameraModel, OpenCvModel};
+use vg::geometry::distortion::Distortion;
+use vg::geometry::{Camera, Pose, Similarity, frame};
+use vg::{Error, Result};
 
 /// COLMAP's camera models and their numbers. Undistort pictures of other models first, with
 /// `colmap image_undistorter`.

@@ -3,13 +3,13 @@
 use super::guard::{clear, free, guarded, guarded_value};
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
-use crate::error::Result;
-use crate::render::{CpuRenderer, Rendered, Rgba8};
-use crate::threads::{OfProcess, Threads};
 use std::process;
 use std::ptr::null_mut;
 use std::sync::atomic::{AtomicPtr, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use vg::Result;
+use vg::render::{CpuRenderer, Rendered, Rgba8};
+use vg::threads::{OfProcess, Threads};
 
 /// Worker threads and scratch memory, made once and named in the options of calls, so that a call neither starts
 /// threads nor allocates what the last one had. Any number of threads may use one context at a time. Free it with

@@ -4,13 +4,13 @@ use super::guard::{clear, guarded, guarded_value};
 use super::options::sh_degree;
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
-use crate::error::{Error, Result};
-use crate::gaussians::{Gaussians, sh};
-use crate::geometry::Similarity;
-use crate::io::ply;
-use crate::progress::Threads;
 use std::ffi::c_char;
 use std::sync::Arc;
+use vg::gaussians::{Gaussians, sh};
+use vg::geometry::Similarity;
+use vg::io::ply;
+use vg::progress::Threads;
+use vg::{Error, Result};
 
 /// A set of Gaussians. Owned by the caller, who frees it with `vg_gaussians_free`. It never changes: `transform`,
 /// `mirror`, `merge`, `select`, `mask` and `crop` return new ones, and any number of threads may read or render one at a time.

@@ -1,13 +1,13 @@
 //! The panic guard: a panic becomes a status with its message and place; it never crosses, and never prints.
 
 use super::status::{vg_error, vg_status};
-use crate::error::Error;
-use crate::threads::THREAD_NAME;
 use std::any::Any;
 use std::cell::Cell;
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook, take_hook};
 use std::sync::{Mutex, Once, PoisonError};
+use vg::Error;
+use vg::threads::THREAD_NAME;
 
 /// Why a function of the C face did not do what it was asked.
 pub(super) enum Failure {

@@ -1,10 +1,10 @@
 //! Pictures in the caller's memory.
 
 use super::read;
-use crate::error::{Error, Result};
-use crate::metrics::COLORS;
-use crate::scene::{DepthMap, Mask, PixelFormat, RgbImage};
 use std::ffi::c_void;
+use vg::metrics::COLORS;
+use vg::scene::{DepthMap, Mask, PixelFormat, RgbImage};
+use vg::{Error, Result};
 
 /// What a pixel holds. 8-bit channels are sRGB-encoded, as cameras and picture files have them.
 #[repr(i32)]
@@ -195,7 +195,7 @@ pub(super) fn extent(
     row_stride: usize,
     pixel: usize,
 ) -> Result<(usize, usize)> {
-    use crate::geometry::camera::MAX_SIDE;
+    use vg::geometry::camera::MAX_SIDE;
     if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
         return Err(Error::argument(
             argument,

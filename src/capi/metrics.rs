@@ -10,11 +10,11 @@ use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
 use super::view::{self, vg_view};
 use super::watched::{Told, watched};
-use crate::error::{Error, Result};
-use crate::metrics::{self, F_SCORE_M, Lpips, SurfaceErrors, SurfaceOptions, ViewErrors};
-use crate::render::{RenderOptions, Renderer};
-use crate::scene::cloud::MAX_CLOUD_POINTS;
 use std::ffi::c_void;
+use vg::metrics::{self, F_SCORE_M, Lpips, SurfaceErrors, SurfaceOptions, ViewErrors};
+use vg::render::{RenderOptions, Renderer};
+use vg::scene::cloud::MAX_CLOUD_POINTS;
+use vg::{Error, Result};
 
 /// Settings of `vg_metrics_pictures`, `vg_metrics_view` and `vg_metrics_surface`.
 #[repr(C)]

@@ -3,9 +3,9 @@
 use super::guard::{clear, free, guarded};
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
-use crate::error::Result;
-use crate::onnx::{Model, ModelOptions, Provider};
 use std::ffi::c_char;
+use vg::Result;
+use vg::onnx::{Model, ModelOptions, Provider};
 
 /// An open ONNX model; `vg_options.prior_model` and `vg_options.head_model` lend it to calls. Any number of threads
 /// may use one model at a time, each with a context of its own or all with one; runs of the same model take turns. It

@@ -6,14 +6,14 @@ use super::model::{self, vg_model};
 use super::read::{self, Versioned};
 use super::render::{backend, vg_backend};
 use super::status::{c_string, one_line, vg_status};
-use crate::error::{Error, Result};
-use crate::pipeline::{Calibrate, DEFAULT_MAX_GAUSSIANS, Keep, Options, PriorChoice};
-use crate::refine::{Amount, RefineOptions};
-use crate::relight::Relight;
-use crate::scene::cloud::MAX_CLOUD_POINTS;
-use crate::scene::{Cloud, Place, VehicleBox};
-use crate::symmetry::SymmetryMode;
 use std::ffi::{CString, c_char, c_void};
+use vg::pipeline::{Calibrate, DEFAULT_MAX_GAUSSIANS, Keep, Options, PriorChoice};
+use vg::refine::{Amount, RefineOptions};
+use vg::relight::Relight;
+use vg::scene::cloud::MAX_CLOUD_POINTS;
+use vg::scene::{Cloud, Place, VehicleBox};
+use vg::symmetry::SymmetryMode;
+use vg::{Error, Result};
 
 /// Where metric depth comes from.
 #[repr(i32)]

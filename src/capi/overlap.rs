@@ -1,6 +1,6 @@
 //! Memory that one call writes to more than one end: no byte may be both.
 
-use crate::error::{Error, Result};
+use vg::{Error, Result};
 
 /// Memory of the caller's that a call writes: rows of the same length, the same distance apart.
 #[derive(Clone, Debug)]

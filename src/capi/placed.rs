@@ -5,9 +5,9 @@ use super::gaussians::{self, vg_gaussians};
 use super::guard::guarded;
 use super::read;
 use super::status::{vg_error, vg_status};
-use crate::error::{Error, Result};
-use crate::geometry::{Camera, Pose, Turntable};
 use glam::DVec3;
+use vg::geometry::{Camera, Pose, Turntable};
+use vg::{Error, Result};
 
 /// A camera's pose by where it stands and what it looks at.
 ///

@@ -1,8 +1,8 @@
 //! Reading what callers hand in: structs that say their size, strings, arrays; and writing structs back.
 
-use crate::error::{Error, Result};
 use std::ffi::{CStr, c_char};
 use std::path::Path;
+use vg::{Error, Result};
 
 /// A struct of the ABI that may grow.
 ///

@@ -9,10 +9,10 @@ use super::report::{ReportObject, vg_report};
 use super::status::{vg_error, vg_status};
 use super::view::{self, vg_view};
 use super::watched::Told;
-use crate::error::Result;
-use crate::pipeline::{self, Reconstruction, Report};
-use crate::progress::Progress;
-use crate::scene::Scene;
+use vg::Result;
+use vg::pipeline::{self, Reconstruction, Report};
+use vg::progress::Progress;
+use vg::scene::Scene;
 
 /// Makes a complete vehicle of photographs of one side.
 ///

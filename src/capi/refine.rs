@@ -9,9 +9,9 @@ use super::render::{backend, vg_backend};
 use super::status::{vg_error, vg_status};
 use super::view::{self, vg_view};
 use super::watched::Told;
-use crate::error::Result;
-use crate::refine::{self, Amount, Densify, RefineOptions, Refinement, Stop};
 use std::ffi::c_void;
+use vg::Result;
+use vg::refine::{self, Amount, Densify, RefineOptions, Refinement, Stop};
 
 /// Settings of `vg_refine`.
 #[repr(C)]

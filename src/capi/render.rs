@@ -10,10 +10,10 @@ use super::overlap::{self, Written};
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
 use super::watched::{Told, watched};
-use crate::error::{Error, Result};
-use crate::render::backend::{Trainer, is_built, not_built, trainer};
-use crate::render::{Backend, Background, DepthMode, RenderOptions, Rendered};
 use std::ffi::c_void;
+use vg::render::backend::{Trainer, is_built, not_built, trainer};
+use vg::render::{Backend, Background, DepthMode, RenderOptions, Rendered};
+use vg::{Error, Result};
 
 /// What draws.
 #[repr(i32)]
@@ -403,7 +403,7 @@ impl Target {
         [color, depth, alpha].into_iter().flatten().collect()
     }
 
-    /// Whether bytes are all that is wanted, and [`Rgba8`](crate::render::Rgba8) has them.
+    /// Whether bytes are all that is wanted, and [`Rgba8`](vg::render::Rgba8) has them.
     pub(super) fn takes_bytes(&self) -> bool {
         let Self { color: Some((_, _, pixel)), depth: None, alpha: None, .. } = self else { return false };
         pixel.layout != Layout::Rgba32f && (pixel.opaque || pixel.alpha == vg_alpha::Straight)
@@ -484,5 +484,5 @@ impl Pixel {
 }
 
 fn byte(value: f32) -> u8 {
-    crate::render::output::to_u8(value)
+    vg::render::output::to_u8(value)
 }

@@ -9,10 +9,10 @@ use super::read::{self, Versioned};
 use super::render::{Target, backend, vg_backend, vg_image_target, vg_render_options};
 use super::status::{c_string, vg_error, vg_status};
 use super::watched::watched;
-use crate::error::Error;
-use crate::render::{AssetRenderer, Backend, Rgba8};
 use std::ffi::{CString, c_char};
 use std::sync::{Mutex, PoisonError};
+use vg::Error;
+use vg::render::{AssetRenderer, Backend, Rgba8};
 
 /// Gaussians made ready to be drawn many times: where a graphics processor draws, they are in its memory, and its
 /// kernels are compiled. Any number of threads may use one at a time. Free it with `vg_renderer_free`.

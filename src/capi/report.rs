@@ -4,9 +4,9 @@ use super::guard::{free, guarded, guarded_value};
 use super::options::vg_prior;
 use super::read::{self, Versioned};
 use super::status::{c_string, one_line, vg_error, vg_status};
-use crate::calibrate::Verdict;
-use crate::pipeline::{self, PointCloud, Report};
 use std::ffi::{CString, c_char};
+use vg::calibrate::Verdict;
+use vg::pipeline::{self, PointCloud, Report};
 
 /// What a reconstruction did, how long it took, what it left out, and the error it can know. Owned by the caller,
 /// who frees it with `vg_report_free`; it never changes.

@@ -9,12 +9,12 @@ use super::read::{self, Versioned};
 use super::status::{c_string, vg_error, vg_status};
 use super::view::vg_view;
 use super::watched::{Told, watched};
-use crate::error::{Error, Result};
-use crate::geometry::Similarity;
-use crate::io::{self, SceneFormat, SceneOptions};
-use crate::scene::view::MAX_VIEWS;
-use crate::scene::{Scene, View};
 use std::ffi::{CString, c_char, c_void};
+use vg::geometry::Similarity;
+use vg::io::{self, SceneFormat, SceneOptions};
+use vg::scene::view::MAX_VIEWS;
+use vg::scene::{Scene, View};
+use vg::{Error, Result};
 
 /// Views read from files, with their pixels. Owned by the caller, who frees it with `vg_scene_free`; it never
 /// changes, and any number of threads may read it.

@@ -7,10 +7,10 @@ use super::image::{self, extent, vg_image};
 use super::model::{self, vg_model};
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
-use crate::error::Error;
-use crate::onnx;
-use crate::scene::mask::Label;
-use crate::scene::{Mask, Segmenter};
+use vg::Error;
+use vg::onnx;
+use vg::scene::mask::Label;
+use vg::scene::{Mask, Segmenter};
 
 /// Settings of `vg_segment`.
 #[repr(C)]

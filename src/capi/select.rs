@@ -4,10 +4,10 @@ use super::gaussians::{make, required, vg_gaussians};
 use super::guard::{guarded, guarded_value};
 use super::read;
 use super::status::{vg_error, vg_status};
-use crate::error::{Error, Result};
-use crate::gaussians::Gaussians;
-use crate::io::ply;
 use std::ffi::c_void;
+use vg::Gaussians;
+use vg::io::ply;
+use vg::{Error, Result};
 
 /// The Gaussians at these indices, in this order; an index may come again.
 ///

@@ -1,8 +1,8 @@
 //! What functions return, and the error object that says why.
 
 use super::guard::{Failure, free, guarded_value};
-use crate::error::Error;
 use std::ffi::{CStr, CString, c_char};
+use vg::Error;
 
 /// What a function returns. Numbers are never reused; later versions may add some, so treat an unknown one as a
 /// failure.
@@ -65,19 +65,9 @@ impl ErrorObject {
     }
 }
 
-/// The numbers that C, and the bindings of other languages, give the library's errors.
 impl From<&Error> for vg_status {
     fn from(error: &Error) -> Self {
-        match error {
-            Error::Argument { .. } => Self::Argument,
-            Error::Format { .. } => Self::Format,
-            Error::Io { .. } => Self::Io,
-            Error::Reconstruction { .. } => Self::Reconstruction,
-            Error::Cancelled { .. } => Self::Cancelled,
-            Error::NotBuilt { .. } => Self::NotBuilt,
-            Error::Missing { .. } => Self::Missing,
-            Error::Threads { .. } => Self::Threads,
-        }
+        Self::ALL[error.status() as usize]
     }
 }
 

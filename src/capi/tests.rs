@@ -3,19 +3,18 @@
 #[path = "../../tests/abi/contents.rs"]
 mod contents;
 mod meaning;
-#[path = "../../tests/abi/tools.rs"]
-mod tools;
 
 use super::guard::{guarded, injection};
 use super::read::Versioned;
 use super::*;
-use crate::progress::Threads;
 use contents::Contents;
 use std::collections::BTreeSet;
 use std::ffi::CStr;
 use std::fmt::Write;
 use std::path::Path;
 use std::ptr::{null, null_mut};
+use vg::progress::Threads;
+use vg_testing::tools;
 
 /// The golden layout without the enumerators, which are plain numbers in Rust.
 fn golden_layout() -> String {
@@ -401,7 +400,7 @@ fn a_panic_in_any_function_comes_back_as_a_status_with_its_place() {
 
 #[test]
 fn no_function_is_missing_from_that_list() {
-    let header = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("include/vg.h")).unwrap();
+    let header = std::fs::read_to_string(vg_testing::root().join("include/vg.h")).unwrap();
     let declared = contents::functions(&header);
     let mut listed: BTreeSet<String> = every_function().iter().map(|(name, _)| (*name).to_owned()).collect();
     // Constants: nothing in them can panic.
@@ -409,7 +408,7 @@ fn no_function_is_missing_from_that_list() {
     assert_eq!(listed, declared);
 }
 
-fn message_of(body: impl FnOnce() -> crate::Result<()>) -> (vg_status, String) {
+fn message_of(body: impl FnOnce() -> vg::Result<()>) -> (vg_status, String) {
     let mut error = null_mut();
     let status = unsafe { guarded(&raw mut error, body) };
     let message = unsafe { CStr::from_ptr(vg_error_message(error)) }.to_str().unwrap().to_owned();

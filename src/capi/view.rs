@@ -5,10 +5,10 @@ use super::guard::guarded;
 use super::image::{self, vg_image};
 use super::read::{self, Versioned};
 use super::status::vg_status;
-use crate::error::{Error, Result};
-use crate::scene::view::MAX_VIEWS;
-use crate::scene::{Scene, View};
 use std::ffi::c_char;
+use vg::scene::view::MAX_VIEWS;
+use vg::scene::{Scene, View};
+use vg::{Error, Result};
 
 /// One photograph of the vehicle.
 #[repr(C)]

@@ -3,10 +3,10 @@
 use super::context::Workshop;
 use super::options::vg_progress_fn;
 use super::status::c_string;
-use crate::error::Result;
-use crate::progress::{Progress, UNWATCHED, Watch};
 use std::ffi::c_void;
 use std::ops::ControlFlow;
+use vg::Result;
+use vg::progress::{Progress, UNWATCHED, Watch};
 
 /// The caller's callback.
 #[derive(Clone, Copy)]

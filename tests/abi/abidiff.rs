@@ -2,8 +2,9 @@
 
 use crate::abixml;
 use crate::symbols::declared;
-use crate::tools::{golden, have, output, run, say, scratch, target};
 use std::process::Command;
+use vg_testing::say;
+use vg_testing::tools::{golden, have, library, output, run, scratch};
 
 #[test]
 fn abidiff_finds_nothing_that_would_break_a_program() {
@@ -19,7 +20,7 @@ fn abidiff_finds_nothing_that_would_break_a_program() {
     let dump = folder.path().join("whole.abi");
     let mut abidw = Command::new("abidw");
     abidw.args(["--no-comp-dir-path", "--no-corpus-path", "--no-show-locs"]);
-    run(abidw.arg("--out-file").arg(&dump).arg(target().join("libvg.so")));
+    run(abidw.arg("--out-file").arg(&dump).arg(library()));
     let found = abixml::of_c_functions(&std::fs::read_to_string(&dump).unwrap());
     // Without debug information there is nothing to compare, and abidiff is content.
     for function in declared() {

@@ -1,16 +1,15 @@
 //! Alignment through the C functions has the bytes of the Rust library.
 
-use crate::common::boxes::{gauge, hatchback, scan, sparse, views};
-use crate::tools;
 use glam::DVec3;
 use std::ffi::CString;
 use std::path::Path;
 use std::ptr::{null, null_mut};
 use vg::View;
 use vg::align::{self, Heading};
-use vg::capi::*;
 use vg::geometry::{Pose, Similarity};
 use vg::scene::Cloud;
+use vg_face::capi::*;
+use vg_testing::boxes::{gauge, hatchback, scan, sparse, views};
 
 /// How a view says what is the vehicle.
 #[derive(Clone, Copy, Debug)]
@@ -210,8 +209,8 @@ fn points_known_in_both_frames_give_the_alignment_of_rust_to_the_byte() {
 
 #[test]
 fn a_folder_gives_the_alignment_of_rust_to_the_byte() {
-    let sample = tools::root().join("tests/data/sedan");
-    let scratch = tools::scratch();
+    let sample = vg_testing::root().join("tests/data/sedan");
+    let scratch = vg_testing::tools::scratch();
     let file = scratch.path().join("scan.ply");
     write_scan(&sample, &file);
     let text = |path: &Path| CString::new(path.to_str().unwrap()).unwrap();

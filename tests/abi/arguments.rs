@@ -2,9 +2,7 @@
 //! or unusual. `calls` has the functions and their arguments; what holds for every call is checked there.
 #![allow(unsafe_code)]
 
-use crate::common::vehicle;
 use crate::symbols::declared;
-use crate::tools::{root, scratch};
 use calls::{
     Call, Done, FEW, FIRST_SIZES, Made, Memory, Outcome, Value, World, bits32, blank, bytes_of, text,
 };
@@ -12,7 +10,10 @@ use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::ptr::{null, null_mut};
-use vg::capi::*;
+use vg_face::capi::*;
+use vg_testing::root;
+use vg_testing::tools::scratch;
+use vg_testing::vehicle;
 
 mod calls;
 
@@ -1797,15 +1798,15 @@ fn alone_one_thread_is_the_calling_one() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_context_of_one_thread_works_where_no_thread_can_be_started() {
-    if !crate::tools::have(&crate::tools::cc(), "gcc", "a system that starts no thread") {
+    if !vg_testing::tools::have(&vg_testing::tools::cc(), "gcc", "a system that starts no thread") {
         return;
     }
     let folder = scratch();
     let mut command = std::process::Command::new(std::env::current_exe().unwrap());
     let name = "arguments::alone_one_thread_is_the_calling_one";
     command.args(["--exact", name, "--ignored", "--test-threads=1"]);
-    command.env("LD_PRELOAD", crate::tools::few_threads(folder.path())).env("VG_TEST_THREADS", "0");
-    let said = crate::tools::run(&mut command);
+    command.env("LD_PRELOAD", vg_testing::tools::few_threads(folder.path())).env("VG_TEST_THREADS", "0");
+    let said = vg_testing::tools::run(&mut command);
     assert!(said.contains("1 passed"), "{said}");
 }
 
@@ -1814,7 +1815,7 @@ fn a_context_of_one_thread_works_where_no_thread_can_be_started() {
 fn threads_end_with_their_context_or_call() {
     let mut command = std::process::Command::new(std::env::current_exe().unwrap());
     let name = "arguments::alone_threads_end_with_their_context";
-    let said = crate::tools::run(command.args(["--exact", name, "--ignored", "--test-threads=1"]));
+    let said = vg_testing::tools::run(command.args(["--exact", name, "--ignored", "--test-threads=1"]));
     assert!(said.contains("1 passed"), "{said}");
 }
 

@@ -4,11 +4,12 @@
 //! deliberate change of the method shows how large it is. The exact bytes are held by a hash that names the
 //! processor path it was made with.
 
-use crate::tools::{golden, root, say};
 use std::ffi::CString;
 use std::ptr::null_mut;
-use vg::capi::*;
 use vg::render::CpuRenderer;
+use vg_face::capi::*;
+use vg_testing::tools::golden;
+use vg_testing::{root, say};
 
 const EVERY: usize = 499;
 

@@ -1,9 +1,10 @@
 //! Programs of earlier releases, compiled against the header of their release, run with today's library.
 
 use crate::contents::functions;
-use crate::tools::{STRICT, cc, compile, cxx, have, library_folder, output, root, run, scratch, target};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use vg_testing::root;
+use vg_testing::tools::{STRICT, cc, compile, cxx, have, library, library_folder, output, run, scratch};
 
 fn releases() -> Vec<PathBuf> {
     let folder = root().join("tests/abi/releases");
@@ -98,12 +99,18 @@ fn the_client_compiles_clean_as_c_and_as_cxx_and_prints_the_same_with_the_static
 
     let static_program = folder.path().join("static");
     let mut command = Command::new(cc());
-    command.arg("-I").arg(&include).arg(&source).arg(target().join("libvg.a")).arg("-o").arg(&static_program);
+    command
+        .arg("-I")
+        .arg(&include)
+        .arg(&source)
+        .arg(library().with_extension("a"))
+        .arg("-o")
+        .arg(&static_program);
     run(command.args(["-lm", "-lpthread", "-ldl"]));
     assert_eq!(as_c, run_client(&static_program, folder.path()));
 
     // "positions 2416776 df54cfba06529b5e": what Rust has, by the golden hashes.
-    let golden = std::fs::read_to_string(crate::tools::golden().join("sedan.hash")).unwrap();
+    let golden = std::fs::read_to_string(vg_testing::tools::golden().join("sedan.hash")).unwrap();
     if golden.lines().next() == Some(&crate::buffers::processor()) {
         for array in golden.lines().skip(1).take(5) {
             let (name, hash) = array.split_once(' ').unwrap();
@@ -141,7 +148,7 @@ fn a_thread_may_end_after_it_unloaded_the_library_which_leaves_no_thread() {
     let mut command = Command::new(cc());
     command.args(STRICT).arg("-I").arg(root().join("include")).arg(root().join("tests/abi/reload.c"));
     run(command.arg("-o").arg(&program).args(["-ldl", "-pthread"]));
-    run(Command::new(program).arg(target().join("libvg.so")).arg(sample()).arg(folder.path()));
+    run(Command::new(program).arg(library()).arg(sample()).arg(folder.path()));
 }
 
 #[test]

@@ -1,11 +1,11 @@
 //! What a generated header contains, and a program that prints sizes, alignments, offsets and numbers of it.
 #![allow(dead_code, unreachable_pub)] // the library's own tests use a part of it
 
-use super::tools::{run, scratch};
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
+use vg_testing::tools::{run, scratch};
 
 /// The header's structs with their fields, and its enumerators.
 #[derive(Default)]

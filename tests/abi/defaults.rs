@@ -1,9 +1,10 @@
 //! Every field of every struct after its `_init` function, as a C program sees it.
 
 use crate::contents::functions;
-use crate::tools::{STRICT, assert_golden, cc, compile, golden, have, library_folder, root, run, scratch};
 use std::fmt::Write;
 use std::process::Command;
+use vg_testing::root;
+use vg_testing::tools::{STRICT, assert_golden, cc, compile, golden, have, library_folder, run, scratch};
 
 /// A field as the header declares it.
 struct Field {

@@ -1,12 +1,12 @@
 //! The backward pass through the C functions has the bytes of the Rust library.
 
 use std::ptr::null_mut;
-use vg::capi::*;
 use vg::gaussians::Gaussians;
 use vg::geometry::{CameraModel, Pose};
 use vg::render::{
     Background, CpuRenderer, DepthMode, Differentiable, Gradients, PictureGradient, RenderOptions, Renderer,
 };
+use vg_face::capi::*;
 
 const SIZE: [u32; 2] = [40, 30];
 const COUNT: usize = 60;

@@ -1,7 +1,8 @@
 //! `include/vg.h` is what cbindgen makes of `src/capi`, and every compiler takes it.
 
-use crate::tools::{STRICT, assert_golden, cc, cxx, have, root, run, scratch};
 use std::process::Command;
+use vg_testing::root;
+use vg_testing::tools::{STRICT, assert_golden, cc, cxx, have, run, scratch};
 
 /// The chapters of the header.
 const CHAPTERS: [&str; 21] = [
@@ -54,7 +55,7 @@ fn every_chapter_of_the_source_is_in_the_header() {
 /// The header's version macros are the package's version.
 #[test]
 fn the_version_macros_are_the_package_version() {
-    use vg::capi::{VG_VERSION_MAJOR, VG_VERSION_MINOR, VG_VERSION_PATCH};
+    use vg_face::capi::{VG_VERSION_MAJOR, VG_VERSION_MINOR, VG_VERSION_PATCH};
     let macros = format!("{VG_VERSION_MAJOR}.{VG_VERSION_MINOR}.{VG_VERSION_PATCH}");
     assert_eq!(macros, env!("CARGO_PKG_VERSION"));
 }

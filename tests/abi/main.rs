@@ -27,8 +27,6 @@ mod align;
 mod arguments;
 mod buffers;
 mod client;
-#[path = "../common/mod.rs"]
-mod common;
 mod contents;
 mod defaults;
 mod gradients;
@@ -37,4 +35,3 @@ mod layout;
 mod meaning;
 mod pictures;
 mod symbols;
-mod tools;

@@ -1,16 +1,17 @@
 //! What numbers that come out of the C functions mean: pixels in every format, the measures, what the log says; each
 //! against Rust's own, or what other programs found. What goes in is in `src/capi/tests/meaning.rs`.
 
-use crate::common::scenes::surfel_car;
-use crate::common::vehicle::{camera, right_side, view};
-use crate::tools::{golden, root};
 use std::collections::BTreeMap;
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::ptr::{null, null_mut};
-use vg::capi::*;
 use vg::metrics::{SurfaceErrors, SurfaceOptions, ViewErrors, on_white, psnr, ssim};
 use vg::render::{Background, CpuRenderer, DepthMode, RenderOptions, Rendered, Renderer};
 use vg::{Camera, Gaussians, View};
+use vg_face::capi::*;
+use vg_testing::root;
+use vg_testing::scenes::surfel_car;
+use vg_testing::tools::golden;
+use vg_testing::vehicle::{camera, right_side, view};
 
 /// A struct after its `_init` function.
 macro_rules! initial {

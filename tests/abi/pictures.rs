@@ -1,10 +1,10 @@
 //! The same photographs in every layout that C hands them over in.
 
 use std::ptr::null_mut;
-use vg::capi::*;
 use vg::scene::{Scene, View};
+use vg_face::capi::*;
 
-use crate::common::vehicle::{right_side, without_depth};
+use vg_testing::vehicle::{right_side, without_depth};
 
 /// How a photograph lies in the caller's memory.
 #[derive(Clone, Copy, Debug)]

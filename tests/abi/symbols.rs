@@ -1,9 +1,10 @@
 //! What the shared library exports, and the name under which the loader looks for it.
 
 use crate::contents::functions;
-use crate::tools::{assert_golden, golden, have, root, run, target};
 use std::collections::BTreeSet;
 use std::process::Command;
+use vg_testing::root;
+use vg_testing::tools::{assert_golden, golden, have, library, run};
 
 /// Names of the functions in the header.
 pub(crate) fn declared() -> BTreeSet<String> {
@@ -16,8 +17,7 @@ fn exactly_the_functions_of_the_golden_list_are_exported() {
     if !have("nm", "binutils", "exported symbols") {
         return;
     }
-    let listing =
-        run(Command::new("nm").args(["-D", "--defined-only", "-f", "posix"]).arg(target().join("libvg.so")));
+    let listing = run(Command::new("nm").args(["-D", "--defined-only", "-f", "posix"]).arg(library()));
     let mut exported: Vec<String> = listing
         .lines()
         .map(|line| {
@@ -40,7 +40,7 @@ fn the_library_answers_to_its_soname() {
     if !have("readelf", "binutils", "soname") {
         return;
     }
-    let dynamic = run(Command::new("readelf").args(["-d", "-W"]).arg(target().join("libvg.so")));
+    let dynamic = run(Command::new("readelf").args(["-d", "-W"]).arg(library()));
     assert!(dynamic.contains("Library soname: [libvg.so.0]"), "{dynamic}");
 }
 
@@ -50,7 +50,7 @@ fn the_library_stays_in_memory_when_it_is_unloaded() {
     if !have("readelf", "binutils", "the flags of the library") {
         return;
     }
-    let dynamic = run(Command::new("readelf").args(["-d", "-W"]).arg(target().join("libvg.so")));
+    let dynamic = run(Command::new("readelf").args(["-d", "-W"]).arg(library()));
     assert!(dynamic.lines().any(|line| line.contains("(FLAGS_1)") && line.contains("NODELETE")), "{dynamic}");
 }
 
@@ -59,7 +59,7 @@ fn the_library_needs_nothing_but_the_system() {
     if !have("readelf", "binutils", "needed libraries") {
         return;
     }
-    let dynamic = run(Command::new("readelf").args(["-d", "-W"]).arg(target().join("libvg.so")));
+    let dynamic = run(Command::new("readelf").args(["-d", "-W"]).arg(library()));
     let needed: Vec<&str> = dynamic
         .lines()
         .filter(|line| line.contains("(NEEDED)"))

@@ -7,7 +7,7 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError};
 /// Numbers of `vehicle_gaussians.Status`.
-pub(crate) use vg::capi::vg_status as Status;
+pub(crate) use vg::error::Status;
 use vg::progress::Threads;
 
 /// Text and place of the last panic, for the message that its payload alone cannot give.
@@ -51,7 +51,7 @@ pub(crate) fn renamed(error: vg::Error, from: &str, to: &str) -> vg::Error {
 
 /// The library's error with the arguments' names in Python.
 pub(crate) fn from_library(py: Python<'_>, error: vg::Error) -> PyErr {
-    let status = Status::from(&error);
+    let status = error.status();
     let message = match error {
         vg::Error::Argument { argument, found, allowed } => {
             let argument = argument.strip_prefix("options.").unwrap_or(&argument);

@@ -4,12 +4,13 @@
 //! The table test and the fuzz target share this file; `super` gives `GUARD` and `vehicle`.
 #![allow(unsafe_code, dead_code)] // each uses a part
 
-use super::{GUARD, vehicle};
+use super::GUARD;
 use std::ffi::{CStr, CString, c_void};
 use std::mem::offset_of;
 use std::path::{Path, PathBuf};
 use std::ptr::{null, null_mut};
-use vg::capi::*;
+use vg_face::capi::*;
+use vg_testing::vehicle;
 
 /// What guards and gaps are filled with.
 pub const CANARY: u8 = 0xA5;

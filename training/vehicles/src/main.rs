@@ -19,7 +19,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use vg::prior::shape::lattice::{HULL_CLAMP_M, Lattice, NODES, hull_on, view_numbers};
-use vg::prior::volume::{Silhouette, estimate_box, inside_all, place_box};
+use vg::prior::volume::{KnownBox, Silhouette, find_box};
 
 /// Distances are clamped to this in the training data, metres.
 const DISTANCE_CLAMP_M: f32 = 0.25;
@@ -99,12 +99,12 @@ fn records(seed: u64, index: usize) -> Vec<Vec<u8>> {
 fn record(vehicle: &vehicle::Vehicle, grid: &Grid, rng: &mut impl Rng) -> Option<Vec<u8>> {
     let views = scene::draw(grid, rng)?;
     let silhouettes: Vec<Silhouette> = views.iter().map(Silhouette::new).collect();
-    let mut vehicle_box = estimate_box(&views, |p| inside_all(&silhouettes, p)).ok()?;
-    if rng.random_bool(0.12) {
-        // The caller knows the size.
+    // Some callers know the size.
+    let known = rng.random_bool(0.12).then(|| {
         let size = (grid.high_inside - grid.low_inside).as_dvec3();
-        vehicle_box = place_box([size.x, 2.0 * size.y, size.z], &vehicle_box);
-    }
+        KnownBox { size: [size.x, 2.0 * size.y, size.z], center: None }
+    });
+    let vehicle_box = find_box(known.as_ref(), &views, &silhouettes).ok()?;
     let lattice = Lattice::around(&vehicle_box);
     let hull = hull_on(&lattice, &silhouettes);
     let [nx, ny, nz] = NODES;

@@ -1,0 +1,117 @@
+//! Gauss-Newton on the seven numbers of a similarity, damped as by Levenberg and Marquardt.
+//!
+//! A step is left-multiplied: a point x of the vehicle frame goes to x + omega x (x - c) + t + sigma (x - c), c the middle of the
+//! scan, so that turn, move and scale hardly depend on each other.
+
+use glam::{DMat3, DQuat, DVec3};
+use nalgebra::{Cholesky, SMatrix, SVector};
+use vg_geometry::Similarity;
+use vg_geometry::progress::Watch;
+
+/// omega (radians), t (metres), sigma (1).
+pub(super) type Numbers = SVector<f64, 7>;
+
+/// Normal equations and what they are the slope of.
+#[derive(Clone)]
+pub(super) struct System {
+    matrix: SMatrix<f64, 7, 7>,
+    right: Numbers,
+    /// Sum of the robust losses.
+    pub(super) cost: f64,
+}
+
+impl System {
+    pub(super) fn new() -> Self {
+        Self { matrix: SMatrix::zeros(), right: Numbers::zeros(), cost: 0.0 }
+    }
+
+    /// A residual in units of its noise, its slope, and the Huber loss that is linear from `bend` on.
+    pub(super) fn add(&mut self, residual: f64, slope: &Numbers, weight: f64, bend: f64) {
+        let size = residual.abs();
+        let (loss, part) =
+            if size <= bend { (0.5 * size * size, 1.0) } else { (bend * (size - 0.5 * bend), bend / size) };
+        self.cost += weight * loss;
+        self.matrix += (weight * part) * slope * slope.transpose();
+        self.right -= (weight * part * residual) * slope;
+    }
+
+    /// A residual that is missing: a constant.
+    pub(super) fn add_constant(&mut self, loss: f64) {
+        self.cost += loss;
+    }
+
+    /// The sum, in the order given.
+    pub(super) fn sum(systems: impl IntoIterator<Item = Self>) -> Self {
+        systems.into_iter().fold(Self::new(), |mut sum, s| {
+            sum.matrix += s.matrix;
+            sum.right += s.right;
+            sum.cost += s.cost;
+            sum
+        })
+    }
+
+    fn step(&self, damping: f64) -> Option<Numbers> {
+        let mut matrix = self.matrix;
+        for k in 0..7 {
+            matrix[(k, k)] = matrix[(k, k)] * (1.0 + damping) + 1e-9;
+        }
+        let step = Cholesky::new(matrix)?.solve(&self.right);
+        step.iter().all(|v| v.is_finite()).then_some(step)
+    }
+}
+
+/// How a point of the vehicle frame moves along `direction` with each of the seven numbers.
+pub(super) fn slope(point: DVec3, center: DVec3, direction: DVec3) -> Numbers {
+    let arm = point - center;
+    let turn = arm.cross(direction);
+    Numbers::from([turn.x, turn.y, turn.z, direction.x, direction.y, direction.z, arm.dot(direction)])
+}
+
+/// The similarity after a step.
+pub(super) fn moved(s: &Similarity, center: DVec3, step: &Numbers) -> Similarity {
+    let turn = DMat3::from_quat(DQuat::from_scaled_axis(DVec3::new(step[0], step[1], step[2])).normalize());
+    let grow = step[6].clamp(-0.3, 0.3).exp();
+    let translation =
+        center + grow * (turn * (s.translation - center)) + DVec3::new(step[3], step[4], step[5]);
+    // Products of rotations drift off being one.
+    let rotation = DMat3::from_quat(DQuat::from_mat3(&(turn * s.rotation)).normalize());
+    Similarity { scale: s.scale * grow, rotation, translation }
+}
+
+/// From `start` downhill, at most `steps` steps.
+pub(super) fn descend(
+    start: Similarity,
+    center: DVec3,
+    steps: usize,
+    watch: &Watch,
+    system: impl Fn(&Similarity) -> System,
+) -> (Similarity, f64) {
+    const TRIALS: usize = 5;
+    const ENOUGH: f64 = 1e-5;
+    let mut best = start;
+    let mut at = system(&best);
+    let mut damping = 1e-3;
+    for _ in 0..steps {
+        if watch.is_stopped() {
+            break;
+        }
+        let mut gained = None;
+        for _ in 0..TRIALS {
+            let Some(step) = at.step(damping) else { break };
+            let next = moved(&best, center, &step);
+            let there = system(&next);
+            if there.cost < at.cost {
+                gained = Some(at.cost - there.cost);
+                (best, at) = (next, there);
+                damping = (damping * 0.2).max(1e-7);
+                break;
+            }
+            damping *= 10.0;
+        }
+        match gained {
+            Some(gain) if gain > ENOUGH * at.cost => {}
+            _ => break,
+        }
+    }
+    (best, at.cost)
+}

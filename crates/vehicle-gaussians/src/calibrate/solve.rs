@@ -1,0 +1,235 @@
+//! The most probable correction: Gauss-Newton on what is missing along the rays, damped as by Levenberg and
+//! Marquardt, with a loss that gives up on what no small correction can explain.
+
+use super::cones::{Ball, Cones, Meeting};
+use super::correction::{CAMERA, Correction, PLANE};
+use super::samples::Sample;
+use crate::prior::volume::Silhouette;
+use glam::Vec3;
+use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
+use vg_scene::View;
+
+/// Noise of a deficit, metres: a mask is good to about a pixel.
+const NOISE_M: f64 = 0.01;
+
+/// How many independent observations two views make, whatever the number of pixels that are asked: neighbours on an
+/// edge err together. Two cones touch at a tangent plane above and one below, either camera sees both, and the twin
+/// of one camera makes as many again: 8. Each is a stretch of edge rather than a point.
+const OBSERVATIONS_PER_PAIR: f64 = 16.0;
+
+/// Steps at most for each scale of the loss.
+const STEPS: usize = 6;
+
+/// A step that gains less than this part of the cost is the last.
+const ENOUGH: f64 = 0.01;
+
+/// Everything that stays the same while cameras move.
+pub(super) struct Problem<'a> {
+    pub(super) views: &'a [View],
+    pub(super) silhouettes: &'a [Silhouette],
+    pub(super) trusted: &'a [bool],
+    pub(super) ball: Ball,
+}
+
+/// Which numbers may move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Free {
+    /// The plane's.
+    Plane,
+    /// The plane's and the cameras'.
+    All,
+}
+
+impl Problem<'_> {
+    pub(super) fn cones(&self, correction: &Correction) -> Cones<'_> {
+        Cones::new(self.silhouettes, self.trusted, self.views, correction, self.ball)
+    }
+
+    /// Where each ray meets the cones. `before` are the same rays' meetings with cameras that were hardly different:
+    /// better ones are looked for near them. Without any, all along the rays.
+    pub(super) fn meetings(&self, c: &Correction, samples: &[Sample], before: &[Meeting]) -> Vec<Meeting> {
+        let cones = self.cones(c);
+        let of = |(k, sample): (usize, &Sample)| cones.meeting(sample, before.get(k).map(|m| m.t));
+        samples.par_iter().enumerate().map(of).collect()
+    }
+
+    /// The correction nearest to `start` that the rays of `samples` ask for; `scales` of the loss in metres, one
+    /// after another.
+    pub(super) fn fit(
+        &self,
+        start: &Correction,
+        samples: &[Sample],
+        free: Free,
+        scales: &[f64],
+    ) -> Correction {
+        let mut correction = start.clone();
+        for &scale in scales {
+            let mut meetings = self.meetings(&correction, samples, &[]);
+            let mut cost = self.cost(&correction, samples, &meetings, scale);
+            let mut damping = 1e-3;
+            for _ in 0..STEPS {
+                let Some((moved, met, lower)) =
+                    self.step(&correction, samples, &meetings, free, scale, cost, &mut damping)
+                else {
+                    break;
+                };
+                let gain = cost - lower;
+                (correction, meetings, cost) = (moved, met, lower);
+                if gain < ENOUGH * cost {
+                    break;
+                }
+            }
+        }
+        correction
+    }
+
+    /// What one observation of this many is worth.
+    fn weight(&self, samples: &[Sample]) -> f64 {
+        let n = self.views.len() as f64;
+        let observations = OBSERVATIONS_PER_PAIR * 0.5 * n * (n - 1.0);
+        (observations / samples.len().max(1) as f64).min(1.0) / (NOISE_M * NOISE_M)
+    }
+
+    fn cost(&self, correction: &Correction, samples: &[Sample], meetings: &[Meeting], scale: f64) -> f64 {
+        let rays: f64 = meetings.iter().map(|m| loss(deficit(m), scale)).sum();
+        let pull = correction.numbers().iter().enumerate().map(|(k, n)| Correction::stiffness(k) * n * n);
+        self.weight(samples) * rays + pull.sum::<f64>()
+    }
+
+    /// A step that lowers the cost, or `None`.
+    fn step(
+        &self,
+        correction: &Correction,
+        samples: &[Sample],
+        meetings: &[Meeting],
+        free: Free,
+        scale: f64,
+        cost: f64,
+        damping: &mut f64,
+    ) -> Option<(Correction, Vec<Meeting>, f64)> {
+        const TRIALS: usize = 4;
+        let (matrix, right) = self.normal_equations(correction, samples, meetings, free, scale);
+        for _ in 0..TRIALS {
+            let mut damped = matrix.clone();
+            for k in 0..damped.nrows() {
+                damped[(k, k)] *= 1.0 + *damping;
+            }
+            let mut step = Cholesky::new(damped)?.solve(&right).as_slice().to_vec();
+            step.resize(correction.numbers().len(), 0.0);
+            let moved = correction.moved(&step);
+            let met = self.meetings(&moved, samples, meetings);
+            let lower = self.cost(&moved, samples, &met, scale);
+            // A cost that is no number is not lower.
+            if lower < cost {
+                *damping = (*damping * 0.2).max(1e-6);
+                return Some((moved, met, lower));
+            }
+            *damping *= 20.0;
+        }
+        None
+    }
+
+    fn normal_equations(
+        &self,
+        correction: &Correction,
+        samples: &[Sample],
+        meetings: &[Meeting],
+        free: Free,
+        scale: f64,
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        let n = match free {
+            Free::Plane => PLANE,
+            Free::All => correction.numbers().len(),
+        };
+        let weight = self.weight(samples);
+        let mut matrix = DMatrix::zeros(n, n);
+        let mut right = DVector::zeros(n);
+        for (k, number) in correction.numbers().iter().enumerate().take(n) {
+            matrix[(k, k)] = Correction::stiffness(k);
+            right[k] = -Correction::stiffness(k) * number;
+        }
+        let cones = self.cones(correction);
+        let middle = correction.moved_middle().as_vec3();
+        let rows: Vec<Option<Row>> = samples
+            .par_iter()
+            .zip(meetings)
+            .map(|(sample, m)| (deficit(m) > 0.0).then(|| Row::new(&cones, middle, sample, m, free)))
+            .collect();
+        // In the samples' order, whatever the threads.
+        for (row, meeting) in rows.iter().zip(meetings) {
+            let Some(row) = row else { continue };
+            let missing = deficit(meeting);
+            let w = weight * robust_weight(missing, scale);
+            for (a, &(i, x)) in row.0.iter().enumerate() {
+                right[i] += w * x * missing;
+                for &(j, y) in &row.0[..=a] {
+                    matrix[(i, j)] += w * x * y;
+                    if i != j {
+                        matrix[(j, i)] += w * x * y;
+                    }
+                }
+            }
+        }
+        (matrix, right)
+    }
+}
+
+/// What is missing for the ray to meet all cones, metres.
+pub(super) fn deficit(meeting: &Meeting) -> f64 {
+    f64::from(-meeting.inside).max(0.0)
+}
+
+/// Geman and McClure's loss: a square below `scale`, constant far above.
+fn loss(r: f64, scale: f64) -> f64 {
+    let r2 = r * r;
+    r2 / (1.0 + r2 / (scale * scale))
+}
+
+/// Half its derivative over r.
+fn robust_weight(r: f64, scale: f64) -> f64 {
+    (1.0 + r * r / (scale * scale)).powi(-2)
+}
+
+/// How the value at a ray's meeting changes with the numbers: index and derivative, each index once.
+struct Row(Vec<(usize, f64)>);
+
+impl Row {
+    fn new(cones: &Cones, middle: Vec3, sample: &Sample, meeting: &Meeting, free: Free) -> Self {
+        let mut row = Self(Vec::with_capacity(PLANE + 3 * CAMERA));
+        let (origin, direction) = cones.ray(sample);
+        let p = origin + meeting.t * direction;
+        for contact in cones.contacts(sample, meeting).into_iter().flatten() {
+            let mirror = if contact.mirrored { Vec3::new(1.0, -1.0, 1.0) } else { Vec3::ONE };
+            // The point moves with its own camera; the cone moves away under it.
+            row.push(middle, sample.view, p, contact.gradient, free);
+            row.push(middle, contact.view, p * mirror, -contact.gradient * mirror, free);
+        }
+        row
+    }
+
+    /// The value changes by `gradient` times the motion of `p`, which moves with the camera of `view`.
+    fn push(&mut self, middle: Vec3, view: usize, p: Vec3, gradient: Vec3, free: Free) {
+        let arm = p - middle;
+        self.add(0, arm.cross(gradient).z);
+        self.add(1, arm.cross(gradient).x);
+        self.add(2, gradient.y);
+        if free == Free::Plane {
+            return;
+        }
+        // The plane's own turn, a few degrees between the two frames, does not matter to a step.
+        let turn = arm.cross(gradient);
+        let first = PLANE + CAMERA * view;
+        for axis in 0..3 {
+            self.add(first + axis, turn[axis]);
+            self.add(first + 3 + axis, gradient[axis]);
+        }
+    }
+
+    fn add(&mut self, index: usize, value: f32) {
+        match self.0.iter_mut().find(|(i, _)| *i == index) {
+            Some((_, sum)) => *sum += f64::from(value),
+            None => self.0.push((index, f64::from(value))),
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! Error of a model's surface against a scan, metres: accuracy, completeness, Chamfer distance, F-score (Knapitsch et
+//! al. 2017, Tanks and Temples), and the error of its size.
+//!
+//! 1. The model's surface is what cameras outside and above see of it (`seen`), as a scanner would, not its centres.
+//! 2. Points of the scan that stand alone are taken out (`strays`): they are air.
+//! 3. On both sides one point a cell of a regular grid is left (`grid`): how densely a side is sampled counts nothing.
+//! 4. Each point's distance to the nearest of the other side, at most [`SurfaceOptions::reach_m`].
+//!
+//! Distances are from point to point: even a perfect model is about half the scan's spacing away from it.
+
+mod grid;
+mod seen;
+mod strays;
+
+use glam::DVec3;
+use rayon::prelude::*;
+use serde::Serialize;
+use vg_geometry::nearest::Nearest;
+use vg_geometry::progress::{UNWATCHED, Watch};
+use vg_geometry::{Error, Result};
+use vg_scene::Cloud;
+use vg_splat::Gaussians;
+
+/// The distance below which a point counts as met, metres.
+pub const F_SCORE_M: f64 = 0.05;
+
+/// How a surface is compared with a scan; lengths in metres, 1e-3 to 1e3.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceOptions {
+    /// The distance below which a point counts as met.
+    pub f_score_m: f64,
+    /// The largest distance that is counted: what is farther away is missing, no matter how far.
+    pub reach_m: f64,
+    /// Side of the cells of which one point is left.
+    pub cell_m: f64,
+}
+
+impl Default for SurfaceOptions {
+    fn default() -> Self {
+        Self { f_score_m: F_SCORE_M, reach_m: 0.5, cell_m: 0.02 }
+    }
+}
+
+impl SurfaceOptions {
+    /// Each field in its range.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] with the field's name.
+    pub fn validate(&self) -> Result<()> {
+        for (name, value) in
+            [("f_score_m", self.f_score_m), ("reach_m", self.reach_m), ("cell_m", self.cell_m)]
+        {
+            if !(1e-3..=1e3).contains(&value) {
+                return Err(Error::argument(format!("options.{name}"), value.to_string(), "0.001 to 1000"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// How far a model's surface is from a scan.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SurfaceErrors {
+    /// Mean distance from the model's surface to the scan, metres.
+    pub accuracy_m: f64,
+    /// Mean distance from the scan to the model's surface, metres.
+    pub completeness_m: f64,
+    /// Mean of the two.
+    pub chamfer_m: f64,
+    /// Share of the model's surface nearer to the scan than the threshold.
+    pub precision: f64,
+    /// Share of the scan nearer to the model's surface than the threshold.
+    pub recall: f64,
+    /// Harmonic mean of the two.
+    pub f_score: f64,
+    /// How much longer (x) the model is than the scan, percent of the scan's length.
+    pub length_error_percent: f64,
+    /// The same of the width (y).
+    pub width_error_percent: f64,
+    /// The same of the height (z).
+    pub height_error_percent: f64,
+}
+
+/// Which part of the work is done when the model has been looked at from all around, by the time that it takes.
+const SEEN: f64 = 0.7;
+
+/// The share of points that may lie beyond either end of a side: strays so near to the vehicle that they were not
+/// known for strays. More would cut off mirrors.
+const BEYOND: f64 = 0.0005;
+
+impl SurfaceErrors {
+    /// Of a model against points measured on the vehicle, vehicle frame, metres.
+    ///
+    /// # Errors
+    /// A model of which nothing is seen, and whatever [`SurfaceErrors::between`] refuses.
+    pub fn of(gaussians: &Gaussians, scan: &[[f32; 3]]) -> Result<Self> {
+        Self::with(gaussians, scan, &SurfaceOptions::default())
+    }
+
+    /// The same with other lengths.
+    ///
+    /// # Errors
+    /// As [`SurfaceErrors::of`].
+    pub fn with(gaussians: &Gaussians, scan: &[[f32; 3]], options: &SurfaceOptions) -> Result<Self> {
+        Self::watched(gaussians, scan, options, &UNWATCHED)
+    }
+
+    /// The same under `watch`.
+    ///
+    /// # Errors
+    /// As [`SurfaceErrors::of`], and [`Error::Cancelled`].
+    pub fn watched(
+        gaussians: &Gaussians,
+        scan: &[[f32; 3]],
+        options: &SurfaceOptions,
+        watch: &Watch,
+    ) -> Result<Self> {
+        options.validate()?;
+        Cloud::check("scan", scan)?;
+        let model = surface(gaussians, options.cell_m, watch)?;
+        watch.report(SEEN)?;
+        Self::compared(&model, scan, options, watch)
+    }
+
+    /// Of points on one surface, which are all taken for the model's, against a scan, which may have strays.
+    ///
+    /// # Errors
+    /// A side without points, with too many for a [`Cloud`], or with one that is not finite; options out of range.
+    pub fn between(model: &[[f32; 3]], scan: &[[f32; 3]], options: &SurfaceOptions) -> Result<Self> {
+        options.validate()?;
+        Cloud::check("model", model)?;
+        Cloud::check("scan", scan)?;
+        Self::compared(model, scan, options, &UNWATCHED)
+    }
+
+    /// Of points and options that were checked.
+    fn compared(
+        model: &[[f32; 3]],
+        scan: &[[f32; 3]],
+        options: &SurfaceOptions,
+        watch: &Watch,
+    ) -> Result<Self> {
+        let model = grid::thinned(model, options.cell_m);
+        let scan = grid::thinned(&strays::removed(scan, watch), options.cell_m);
+        watch.check()?;
+        let there = distances(&model, &scan, options.reach_m, watch);
+        let back = distances(&scan, &model, options.reach_m, watch);
+        watch.check()?;
+        let (accuracy_m, completeness_m) = (mean(&there), mean(&back));
+        let (precision, recall) = (share(&there, options.f_score_m), share(&back, options.f_score_m));
+        let both = precision + recall;
+        let of_model = extents(&strays::removed(&model, watch));
+        watch.check()?;
+        let of_scan = extents(&scan);
+        let [length, width, height] = std::array::from_fn(|k| {
+            if of_scan[k] > 0.0 { 100.0 * (of_model[k] / of_scan[k] - 1.0) } else { 0.0 }
+        });
+        Ok(Self {
+            accuracy_m,
+            completeness_m,
+            chamfer_m: 0.5 * (accuracy_m + completeness_m),
+            precision,
+            recall,
+            f_score: if both > 0.0 { 2.0 * precision * recall / both } else { 0.0 },
+            length_error_percent: length,
+            width_error_percent: width,
+            height_error_percent: height,
+        })
+    }
+}
+
+/// What is seen of a model from outside and above, one point a cell of a regular grid, vehicle frame, metres.
+///
+/// # Errors
+/// A model without Gaussians, or one of which nothing is seen.
+pub fn visible_surface(gaussians: &Gaussians, cell_m: f64) -> Result<Vec<[f32; 3]>> {
+    surface(gaussians, cell_m, &UNWATCHED)
+}
+
+/// As [`visible_surface`], under `watch`.
+fn surface(gaussians: &Gaussians, cell_m: f64, watch: &Watch) -> Result<Vec<[f32; 3]>> {
+    let points = grid::thinned(&seen::points(gaussians, cell_m, watch)?, cell_m);
+    if points.is_empty() {
+        let found = "nothing with an alpha of 0.5 from any side";
+        return Err(Error::argument("gaussians", found, "a surface that can be seen"));
+    }
+    Ok(points)
+}
+
+/// From each point to the nearest of the others, at most `reach`.
+fn distances(points: &[[f32; 3]], others: &[[f32; 3]], reach: f64, watch: &Watch) -> Vec<f64> {
+    let tree = Nearest::of_f32(others);
+    let distance = |p: &[f32; 3]| {
+        if watch.is_stopped() {
+            return reach;
+        }
+        tree.nearest(DVec3::from_array(p.map(f64::from))).map_or(reach, |n| n.squared.sqrt().min(reach))
+    };
+    points.par_iter().map(distance).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+fn share(distances: &[f64], below: f64) -> f64 {
+    distances.iter().filter(|d| **d < below).count() as f64 / distances.len() as f64
+}
+
+/// Along each axis, from where [`BEYOND`] of the points lie before to where as many lie behind.
+fn extents(points: &[[f32; 3]]) -> [f64; 3] {
+    std::array::from_fn(|k| {
+        let mut along: Vec<f32> = points.iter().map(|p| p[k]).collect();
+        let beyond = (BEYOND * along.len() as f64) as usize;
+        let last = along.len() - 1;
+        let low = *along.select_nth_unstable_by(beyond, f32::total_cmp).1;
+        let high = *along.select_nth_unstable_by(last - beyond, f32::total_cmp).1;
+        f64::from(high) - f64::from(low)
+    })
+}

@@ -1,0 +1,169 @@
+//! Whether a network's own cameras and its views agree with the caller's, and by which scales they come to do so.
+
+use glam::DVec3;
+use nalgebra::{DMatrix, DVector, Matrix3};
+use serde::Serialize;
+use vg_geometry::{Camera, Pose};
+use vg_scene::{DepthMap, View};
+
+/// The network's cameras against the caller's, in the frame of the first view.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PoseFit {
+    /// What the network's translations must be multiplied by, on the whole, to be the caller's.
+    pub scale: f64,
+    /// Degrees between each camera's rotation and the caller's.
+    pub rotation_degrees: Vec<f64>,
+    /// Metres between each camera's place and the caller's, after turning and scaling all of them as one.
+    pub center_m: Vec<f64>,
+}
+
+/// How much views contradict each other's depth.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ViewFit {
+    /// By which each view's depth was multiplied.
+    pub scales: Vec<f64>,
+    /// Median of |ln(depth / depth that another view sees there)| before.
+    pub before: f64,
+    /// And after.
+    pub after: f64,
+}
+
+/// Camera centres closer than this together say nothing of scale, metres.
+const BASELINE_M: f64 = 0.01;
+
+/// Fits `predicted` camera poses, metres as the network has them, to the `given` ones, both camera-to-reference.
+/// `None` where no two cameras are apart. Rotation by orthogonal Procrustes, scale by least squares.
+pub(super) fn fit_poses(predicted: &[Pose], given: &[Pose]) -> Option<PoseFit> {
+    let centred = |poses: &[Pose]| {
+        let mean = poses.iter().map(|p| p.translation).sum::<DVec3>() / poses.len() as f64;
+        poses.iter().map(|p| p.translation - mean).collect::<Vec<DVec3>>()
+    };
+    let (from, to) = (centred(predicted), centred(given));
+    let squared = |v: &[DVec3]| v.iter().map(|p| p.length_squared()).sum::<f64>();
+    if squared(&to).sqrt() < BASELINE_M || squared(&from) < 1e-12 * squared(&to) {
+        return None;
+    }
+    let matrix = |v: DVec3| nalgebra::Vector3::new(v.x, v.y, v.z);
+    let covariance: Matrix3<f64> =
+        from.iter().zip(&to).map(|(f, t)| matrix(*t) * matrix(*f).transpose()).sum();
+    let svd = covariance.svd(true, true);
+    let (u, v) = (svd.u?, svd.v_t?);
+    // Cameras on a line leave a turn about it open; a reflection it must not be.
+    let sign = (u * v).determinant().signum();
+    let rotation = u * Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0, 1.0, sign)) * v;
+    let turned: Vec<DVec3> = from
+        .iter()
+        .map(|f| {
+            let r = rotation * matrix(*f);
+            DVec3::new(r.x, r.y, r.z)
+        })
+        .collect();
+    let scale = to.iter().zip(&turned).map(|(t, f)| t.dot(*f)).sum::<f64>() / squared(&turned);
+    let angle = |(p, g): (&Pose, &Pose)| {
+        let trace = (p.rotation.transpose() * g.rotation).to_cols_array();
+        (0.5 * (trace[0] + trace[4] + trace[8] - 1.0)).clamp(-1.0, 1.0).acos().to_degrees()
+    };
+    Some(PoseFit {
+        scale,
+        rotation_degrees: predicted.iter().zip(given).map(angle).collect(),
+        center_m: to.iter().zip(&turned).map(|(t, f)| (*t - scale * *f).length()).collect(),
+    })
+}
+
+/// Pixels of a view that are compared with the others, at most about so many.
+const SAMPLES: usize = 4000;
+
+/// Depths that differ by more than this factor are of different things.
+const SAME: f64 = 1.5;
+
+/// Logarithms beyond this are outliers (Huber).
+const HUBER: f64 = 0.05;
+
+/// How strongly scales are held at 1, beside one pair of pixels.
+const HELD: f64 = 1.0;
+
+/// One factor per view by which their depths agree best where two views see one place, if that betters them.
+pub(super) fn fit_views(views: &[View], depths: &[DepthMap]) -> Option<ViewFit> {
+    let pairs = pairs(views, depths);
+    let n = views.len();
+    let typical =
+        |b: &DVector<f64>| median(pairs.iter().map(|p| (p.ratio - b[p.from] + b[p.to]).abs()).collect());
+    let mut b = DVector::zeros(n);
+    let before = typical(&b)?;
+    const ROUNDS: usize = 10;
+    for _ in 0..ROUNDS {
+        let mut normal = DMatrix::identity(n, n) * HELD;
+        let mut right = DVector::zeros(n);
+        for p in &pairs {
+            let residual: f64 = p.ratio - b[p.from] + b[p.to];
+            let weight = (HUBER / residual.abs().max(HUBER)).min(1.0);
+            normal[(p.from, p.from)] += weight;
+            normal[(p.to, p.to)] += weight;
+            normal[(p.from, p.to)] -= weight;
+            normal[(p.to, p.from)] -= weight;
+            right[p.from] += weight * p.ratio;
+            right[p.to] -= weight * p.ratio;
+        }
+        b = normal.cholesky()?.solve(&right);
+    }
+    let after = typical(&b)?;
+    let better = after < before;
+    let scales = b.iter().map(|b| if better { b.exp() } else { 1.0 }).collect();
+    Some(ViewFit { scales, before, after: if better { after } else { before } })
+}
+
+/// The upper one of two in the middle; `None` of nothing.
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// View `to` sees, in the direction where view `from` has a surface, another depth: ln(its depth / the projected).
+struct Pair {
+    from: usize,
+    to: usize,
+    ratio: f64,
+}
+
+fn pairs(views: &[View], depths: &[DepthMap]) -> Vec<Pair> {
+    let mut out = Vec::new();
+    for (i, (view, depth)) in views.iter().zip(depths).enumerate() {
+        let seen: Vec<(u32, u32, f32)> = vehicle_pixels(view, depth).collect();
+        let every = (seen.len() / SAMPLES).max(1);
+        for (j, other) in views.iter().enumerate().filter(|(j, _)| *j != i) {
+            // From camera to camera: the frame between them may be kilometres away.
+            let to_from = other.camera.vehicle_from_camera.inverse().after(&view.camera.vehicle_from_camera);
+            for (u, v, z) in seen.iter().step_by(every) {
+                let [x, y] =
+                    view.camera.intrinsics.normalized_from_pixel([f64::from(*u) + 0.5, f64::from(*v) + 0.5]);
+                let place = to_from.transform_point(f64::from(*z) * DVec3::new(x, y, 1.0));
+                if let Some(found) = depth_towards(other, &depths[j], place)
+                    && (found / place.z).max(place.z / found) < SAME
+                {
+                    // Farther in j than projected from i: i is too near, or j too far.
+                    out.push(Pair { from: i, to: j, ratio: (found / place.z).ln() });
+                }
+            }
+        }
+    }
+    out
+}
+
+fn vehicle_pixels<'a>(view: &'a View, depth: &'a DepthMap) -> impl Iterator<Item = (u32, u32, f32)> + 'a {
+    let pixels = (0..depth.height()).flat_map(|v| (0..depth.width()).map(move |u| (u, v)));
+    pixels
+        .filter(|(u, v)| view.mask.as_ref().is_none_or(|m| m.is_vehicle(*u, *v)))
+        .filter_map(|(u, v)| Some((u, v, depth.get(u, v)?)))
+}
+
+/// The depth of the vehicle that a view has in the direction of `place`, a point in its camera's frame.
+fn depth_towards(view: &View, depth: &DepthMap, place: DVec3) -> Option<f64> {
+    let camera: &Camera = &view.camera;
+    let [u, v] = camera.project(place)?;
+    let inside = u >= 0.0 && v >= 0.0 && u < f64::from(camera.width) && v < f64::from(camera.height);
+    let (u, v) = (u as u32, v as u32);
+    if !inside || view.mask.as_ref().is_some_and(|m| !m.is_vehicle(u, v)) {
+        return None;
+    }
+    depth.get(u, v).map(f64::from)
+}

@@ -1,0 +1,245 @@
+//! The learned prior: the hull of the silhouettes, corrected by what vehicles look like.
+//!
+//! A few silhouettes at one height carve a hull that is too fat, but how fat is predictable from where on the
+//! vehicle one looks. A small network that was trained on procedural vehicles only (`network`) turns the hull on
+//! a coarse lattice over half the vehicle ([`lattice`]) into signed distance to the vehicle's surface, with an
+//! uncertainty. It is one surface for all views and their mirrored twins: nothing has to be fused. Where the network
+//! is unsure the surface stays nearer to the hull, and nowhere it leaves the hull. Then it moves to where the
+//! photographs agree (`prior::photo`), it yields where masks are not filled, and at last it moves to measured points,
+//! where there are some.
+
+pub mod lattice;
+mod network;
+
+use super::hull::require_masks;
+use super::photo::fit_photographs;
+use super::volume::extent::MIRROR_M;
+use super::volume::relax::HULL_SLACK_M;
+use super::volume::{
+    Field, KnownBox, Silhouette, denied, fill_masks, find_box, fit_cloud, inside_both, inside_known, march,
+};
+use super::{DepthPrior, Ends, Geometry, WorkingBox};
+use glam::{DVec3, IVec3, Vec3};
+use lattice::{HULL_CLAMP_M, Lattice, NODES, VIEW_NUMBERS, hull_on, view_numbers};
+use network::{Network, Planes};
+use rayon::prelude::*;
+use vg_geometry::Result;
+use vg_geometry::progress::Context;
+use vg_scene::{Cloud, DepthMap, View};
+
+/// Metres per unit of the network's answer.
+const UNIT_M: f32 = 0.25;
+
+/// Logarithms of the Laplace scale are clamped to these, units of [`UNIT_M`].
+const LOG_SCALE: std::ops::RangeInclusive<f32> = -4.0..=1.0;
+
+/// An expected error that halves a pixel's confidence, metres.
+const HALF_TRUSTED_M: f32 = 0.05;
+
+/// Corrections with smaller expected errors are applied in full, those with larger ones not at all, metres.
+const TRUSTED_M: std::ops::Range<f32> = 0.10..0.30;
+
+/// A ray of a vehicle pixel that passes the predicted surface by farther than this, and yet meets the hull, shows
+/// something that the network does not know, metres.
+const DENIED_M: f32 = 0.12;
+
+/// Nearer to such a place than the first no correction is applied, farther than the second all, metres.
+const GIVEN_UP_M: std::ops::Range<f32> = 0.2..0.4;
+
+/// The predicted surface is drawn in by this much, metres: a surfel reaches about half a pixel beyond its centre.
+const INSET_M: f32 = 0.01;
+
+/// See the module's documentation.
+#[derive(Clone, Debug, Default)]
+pub struct ShapePrior {
+    /// The vehicle's box, as far as the caller knows it.
+    pub known_box: Option<KnownBox>,
+    /// Points measured on the vehicle, where there are some.
+    pub cloud: Option<Cloud>,
+    /// Whether the surface is also moved to where the photographs agree, see `prior::photo`.
+    pub photo: bool,
+    /// Grid spacing, metres, where a coarser one than the finest useful one will do.
+    pub voxel_m: Option<f64>,
+}
+
+impl DepthPrior for ShapePrior {
+    fn name(&self) -> &'static str {
+        "shape"
+    }
+
+    fn estimate(&self, views: &[View], context: &Context) -> Result<Geometry> {
+        require_masks(views)?;
+        let silhouettes: Vec<Silhouette> =
+            context.parallel(|| views.par_iter().map(Silhouette::new).collect());
+        context.report("prior", 0.1)?;
+        let working_box = context.parallel(|| find_box(self.known_box.as_ref(), views, &silhouettes))?;
+        context.report("prior", 0.2)?;
+        let network = Network::embedded()?;
+        let mut shape = context.parallel(|| Shape::predict(network, &working_box, &silhouettes, views));
+        context.report("prior", 0.35)?;
+        let (mut field, hull) = context.parallel(|| {
+            let (field, hull) = shape.field(&working_box, &silhouettes, self.voxel_m);
+            let unknown = denied(&field, &hull, views, DENIED_M);
+            if unknown.is_empty() {
+                return (field, hull);
+            }
+            shape.give_up_near(&unknown);
+            (shape.bounded_by(&hull), hull)
+        });
+        context.report("prior", 0.45)?;
+        let photo = match self.photo {
+            true => Some(context.parallel(|| fit_photographs(&mut field, &hull, views))?),
+            false => None,
+        };
+        context.report("prior", 0.7)?;
+        let masks = context.parallel(|| fill_masks(&mut field, Some(&hull), views));
+        let points = context.parallel(|| fit_cloud(&mut field, &hull, views, self.cloud.as_ref()));
+        context.report("prior", 0.8)?;
+        let mut depths = Vec::with_capacity(views.len());
+        for (i, view) in views.iter().enumerate() {
+            depths.push(context.parallel(|| shape.with_confidence(view, march::march(view, &field)?))?);
+            context.report("prior", 0.8 + 0.2 * (i + 1) as f64 / views.len() as f64)?;
+        }
+        let error = |p: Vec3| f64::from(shape.lattice.sample(&shape.error, p));
+        let ends = context.parallel(|| Ends::of_field(&field, error));
+        Ok(Geometry { points, ends, photo, masks: Some(masks), ..Geometry::new(depths, Some(working_box)) })
+    }
+}
+
+/// What the network says of half a vehicle.
+struct Shape {
+    lattice: Lattice,
+    /// How far inside the hull, metres, clamped to the network's range. `[16][32][96]`
+    hull: Vec<f32>,
+    /// Signed distance to the surface, positive inside, metres. `[16][32][96]`
+    distance: Vec<f32>,
+    /// Mean absolute error to be expected there, metres. `[16][32][96]`
+    error: Vec<f32>,
+}
+
+impl Shape {
+    fn predict(
+        network: &Network,
+        working_box: &WorkingBox,
+        silhouettes: &[Silhouette],
+        views: &[View],
+    ) -> Self {
+        let lattice = Lattice::around(working_box);
+        let mut hull = hull_on(&lattice, silhouettes);
+        let input = network_input(&hull, &view_numbers(working_box, views));
+        let answer = network.run(&input);
+        let [nx, ny, nz] = NODES;
+        let mut distance = vec![0.0f32; hull.len()];
+        let mut error = vec![0.0f32; hull.len()];
+        hull.iter_mut().for_each(|h| *h = h.clamp(-UNIT_M, UNIT_M));
+        for (row, hull) in hull.chunks_exact(nx).enumerate() {
+            let (j, k) = (row / nz, row % nz);
+            let (correction, log_scale) = (answer.row(j, k), answer.row(ny + j, k));
+            for i in 0..nx {
+                let at = row * nx + i;
+                error[at] = UNIT_M * log_scale[i].clamp(*LOG_SCALE.start(), *LOG_SCALE.end()).exp();
+                distance[at] = hull[i] + trust(error[at]) * UNIT_M * correction[i];
+            }
+        }
+        Self { lattice, hull, distance, error }
+    }
+
+    /// The depth with its confidence, `c` = 1 / (1 + e / 0.05 m) where the network expects an error of `e`, times
+    /// what the depth had.
+    fn with_confidence(&self, view: &View, depth: DepthMap) -> Result<DepthMap> {
+        let width = depth.width();
+        let confidence = (0..depth.depth().len() as u32)
+            .into_par_iter()
+            .map(|pixel| {
+                let (u, v) = (pixel % width, pixel / width);
+                depth.get(u, v).map_or(0.0, |z| {
+                    let error = self.lattice.sample(&self.error, view.lift(u, v, z));
+                    depth.confidence().map_or(1.0, |c| c[pixel as usize]) / (1.0 + error / HALF_TRUSTED_M)
+                })
+            })
+            .collect();
+        depth.with_confidence(confidence)
+    }
+
+    /// On a fine grid, nowhere outside the hull, and the hull itself.
+    fn field(
+        &self,
+        working_box: &WorkingBox,
+        silhouettes: &[Silhouette],
+        coarser: Option<f64>,
+    ) -> (Field, Field) {
+        let (low, high) = (DVec3::from_array(working_box.low), DVec3::from_array(working_box.high));
+        let voxel = super::hull::voxel(working_box, coarser);
+        let margin = DVec3::new(2.0 * voxel, MIRROR_M, 2.0 * voxel);
+        let hull = Field::symmetric(low - margin, high + margin, voxel, |p| {
+            inside_both(silhouettes, p).min(inside_known(working_box, p))
+        });
+        (self.bounded_by(&hull), hull)
+    }
+
+    /// On the hull's grid, nowhere outside it.
+    fn bounded_by(&self, hull: &Field) -> Field {
+        let mut field = hull.clone();
+        field.adjust(|p, hull| (self.lattice.sample(&self.distance, p) - INSET_M).min(hull + HULL_SLACK_M));
+        field
+    }
+
+    /// Takes corrections back, all of them within [`GIVEN_UP_M`] of these places and their mirror images, then less
+    /// and less: the masks show something there that the network took away.
+    fn give_up_near(&mut self, places: &[Vec3]) {
+        let fold = |p: &Vec3| Vec3::new(p.x, p.y.abs(), p.z);
+        // Neighbouring rays tell the same.
+        let mut cells: Vec<[i32; 3]> =
+            places.iter().map(|p| (fold(p) / GIVEN_UP_M.start * 2.0).round().as_ivec3().to_array()).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        let places: Vec<Vec3> =
+            cells.iter().map(|c| IVec3::from_array(*c).as_vec3() * GIVEN_UP_M.start * 0.5).collect();
+        let [nx, _, nz] = NODES;
+        let lattice = self.lattice;
+        let rows = self.distance.par_chunks_mut(nx).zip(self.hull.par_chunks(nx)).enumerate();
+        rows.for_each(|(row, (distance, hull))| {
+            for (i, (distance, hull)) in distance.iter_mut().zip(hull).enumerate() {
+                let node = lattice.node(i, row / nz, row % nz);
+                let near =
+                    places.iter().map(|p| p.distance_squared(node)).fold(f32::INFINITY, f32::min).sqrt();
+                let kept = way_through(&GIVEN_UP_M, near);
+                *distance = hull + kept * (*distance - hull);
+            }
+        });
+    }
+}
+
+/// The part of a correction that is applied: where the network does not know what it sees, the hull at least is
+/// what the silhouettes say.
+fn trust(error: f32) -> f32 {
+    1.0 - way_through(&TRUSTED_M, error)
+}
+
+/// 0 before the range, 1 behind it, linear between.
+fn way_through(range: &std::ops::Range<f32>, x: f32) -> f32 {
+    ((x - range.start) / (range.end - range.start)).clamp(0.0, 1.0)
+}
+
+/// Channels as `training/shape/network.py` has them: hull slices along |y|, x, z, and the view numbers, constant.
+fn network_input(hull: &[f32], numbers: &[f32; VIEW_NUMBERS]) -> Planes {
+    let [nx, ny, nz] = NODES;
+    let mut input = Planes::new(ny + 2 + VIEW_NUMBERS, nz, nx);
+    let centered = |i: usize, n: usize| 2.0 * i as f32 / (n - 1) as f32 - 1.0;
+    for k in 0..nz {
+        for j in 0..ny {
+            let row = &hull[(j * nz + k) * nx..][..nx];
+            for (value, hull) in input.row_mut(j, k).iter_mut().zip(row) {
+                *value = hull / HULL_CLAMP_M;
+            }
+        }
+        for (i, value) in input.row_mut(ny, k).iter_mut().enumerate() {
+            *value = centered(i, nx);
+        }
+        input.row_mut(ny + 1, k).fill(centered(k, nz));
+        for (c, number) in numbers.iter().enumerate() {
+            input.row_mut(ny + 2 + c, k).fill(*number);
+        }
+    }
+    input
+}

@@ -1,0 +1,54 @@
+//! How far points lie apart: the size that 3DGS gives a Gaussian at first.
+
+use glam::DVec3;
+use rayon::prelude::*;
+use vg_geometry::nearest::Nearest;
+
+/// Neighbours that are looked at.
+const NEIGHBOURS: usize = 3;
+
+/// The root of the mean square distance to the three nearest others, for each point, in the points' unit; of fewer
+/// points to those there are, and 0 of one alone.
+pub(super) fn spacing(points: &[[f32; 3]]) -> Vec<f32> {
+    let tree = Nearest::of_f32(points);
+    let of = |(i, point): (usize, &[f32; 3])| {
+        let mut near = tree.k_nearest(DVec3::from_array(point.map(f64::from)), NEIGHBOURS + 1);
+        // The point itself, but for as many others in the same place.
+        let own = near.iter().position(|n| n.index == i).unwrap_or(near.len() - 1);
+        near.remove(own);
+        (near.iter().map(|n| n.squared).sum::<f64>() / near.len().max(1) as f64).sqrt() as f32
+    };
+    points.par_iter().enumerate().map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::refine::chance::Chance;
+
+    #[test]
+    fn a_points_size_is_that_of_looking_at_all_others() {
+        for n in [0u64, 1, 2, 3, 9, 700] {
+            let point = |i: u64| {
+                let mut chance = Chance::of([n, 1, i]);
+                // A coarse grid: many coincide or are equally far.
+                [(); 3].map(|()| (chance.uniform() * 12.0).floor() as f32)
+            };
+            let points: Vec<[f32; 3]> = (0..n).map(point).collect();
+            let slowly = |i: usize| {
+                let squared =
+                    |j: usize| (0..3).map(|k| f64::from(points[i][k] - points[j][k]).powi(2)).sum::<f64>();
+                let mut all: Vec<f64> = (0..points.len()).filter(|j| *j != i).map(squared).collect();
+                all.sort_by(f64::total_cmp);
+                all.truncate(3);
+                (all.iter().sum::<f64>() / all.len().max(1) as f64).sqrt() as f32
+            };
+            assert_eq!(spacing(&points), (0..points.len()).map(slowly).collect::<Vec<_>>(), "{n}");
+        }
+    }
+
+    #[test]
+    fn points_in_one_place_have_no_size() {
+        assert_eq!(spacing(&[[1.0, 2.0, 3.0]; 9]), [0.0; 9]);
+    }
+}

@@ -1,0 +1,238 @@
+//! Per-scene optimisation: the Gaussians of one pass are moved until their pictures are the photographs.
+//!
+//! One step draws one view, takes the gradient of its error, and moves every parameter by Adam. Clones have no
+//! parameters of their own (`tie`): what a view of one side says, the other side follows. Photographs differ in
+//! exposure, which is solved for as well (`exposure`). Gaussians may divide and go on the way (`densify`). A view can be
+//! held out to tell when to stop: pictures of the views that take part always get better, the vehicle need not.
+//! [`baseline`] is another method on the same footing.
+
+mod adam;
+pub mod baseline;
+mod chance;
+mod densify;
+mod exposure;
+mod model;
+mod options;
+mod parameters;
+mod plan;
+mod target;
+pub(crate) mod tie;
+mod work;
+
+pub use densify::{Densified, Densify};
+pub use model::{model, model_on};
+pub use options::{Amount, RefineOptions};
+pub use parameters::Rates;
+
+use exposure::Exposure;
+use parameters::Parameters;
+use plan::Plan;
+use serde::Serialize;
+use std::collections::VecDeque;
+use std::time::Instant;
+use tie::Clone as Tied;
+use vg_geometry::Result;
+use vg_geometry::progress::Context;
+use vg_scene::View;
+use vg_splat::Gaussians;
+use work::{Measures, Work};
+
+/// Why a refinement ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stop {
+    /// All steps are done.
+    Done,
+    /// The view that took no part got no better any more.
+    HeldOut,
+    /// The error grew far beyond where it began: the steps are too large.
+    Diverged,
+    /// No view sees anything of the model: there is nothing to begin with.
+    Unseen,
+}
+
+/// What a refinement did.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Refinement {
+    /// Steps that were planned: with `Amount::Iterations` of this number another call does the same.
+    pub iterations: u32,
+    /// Steps that were made.
+    pub made: u32,
+    /// Steps that the result has seen; 0 if nothing was better than the beginning.
+    pub kept: u32,
+    /// Why it ended.
+    pub stop: Stop,
+    /// Loss of the first step, and the mean of the last round over the views.
+    pub loss: [f64; 2],
+    /// Mean PSNR of the views that took part, each in its exposure, before and after, dB.
+    pub psnr_db: [f64; 2],
+    /// The view that did not, where one was held out.
+    pub held_out: Option<HeldOut>,
+    /// Factors of the views' exposures, RGB, in the order of the views.
+    pub exposures: Vec<[f32; 3]>,
+    /// What density control did, where it was wanted.
+    pub densified: Option<Densified>,
+    /// Who drew, and why.
+    pub drawn_by: String,
+}
+
+/// The view that took no part.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HeldOut {
+    /// Its name.
+    pub view: String,
+    /// Its PSNR before and after, dB.
+    pub psnr_db: [f64; 2],
+}
+
+/// Looks at the view that was held out, or at the mean loss, in the course of a refinement.
+const LOOKS: u32 = 20;
+/// So many looks in a row may be worse than the best.
+const PATIENCE: u32 = 4;
+/// A mean loss this many times the first never comes back.
+const DIVERGED: f64 = 3.0;
+/// Gradients of this size are noise of single pixels: a loss is a mean over all pixels.
+const NOISE: f32 = 1e-9;
+/// Step sizes at the end, as a share of those at the beginning.
+const LAST_RATE: f32 = 0.1;
+
+/// Moves the Gaussians until their pictures are those of the views. The last ones are `clones`, mirror images of those
+/// before; they follow. Views are pinholes in the frame whose plane of symmetry is y = 0.
+pub(crate) fn refine(
+    mut gaussians: Gaussians,
+    clones: &[Tied],
+    views: &[View],
+    options: &RefineOptions,
+    context: &Context,
+) -> Result<(Gaussians, Refinement)> {
+    let start = Instant::now();
+    gaussians.truncate(gaussians.len() - clones.len());
+    let beginning = State::of(&gaussians, clones, views.len());
+    let measures = Measures { noise: NOISE, extent_m: half_diagonal_m(&gaussians), seed: 0 };
+    let mut work = Work::new(&beginning, views, options, measures)?;
+    let mut state = beginning.clone();
+    drop(gaussians);
+    let held_out = (options.hold_out && views.len() >= 3).then_some(views.len() / 2);
+    let shown: Vec<usize> = (0..views.len()).filter(|v| Some(*v) != held_out).collect();
+    let round = shown.len() as u32;
+    let (before, seen) = work.begin(&state, context)?;
+
+    let amount = if seen { options.amount } else { Amount::Iterations(0) };
+    let mut plan = Plan::new(amount, round, start);
+    let mut course = Course::default();
+    let mut best = Best { error: f64::INFINITY, step: 0, state: state.clone() };
+    if let Some(v) = held_out {
+        best.error = -before[v];
+    }
+    let (mut made, mut stop) = (0, if seen { Stop::Done } else { Stop::Unseen });
+    let mut looks_in_vain = 0;
+    while plan.goes_on(made) {
+        // As in 3DGS, step sizes fall exponentially.
+        let rates = options.rates.times(LAST_RATE.powf(plan.part(made)));
+        let view = shown[(made % round) as usize];
+        course.push(work.step(view, &mut state, &rates, context)?, round);
+        made += 1;
+        plan.note(made);
+        if let Some(planned) = plan.planned_at(made) {
+            work.densify(&mut state, made, planned, context);
+        }
+        let Some(planned) = plan.planned() else { continue };
+        context.report_loss("refine", f64::from(made) / f64::from(planned), course.last)?;
+        let every = (planned / LOOKS).max(round);
+        if made % every != 0 && made != planned {
+            continue;
+        }
+        let error = match held_out {
+            Some(v) => -work.psnr_of(v, &state, context)?,
+            None => course.last,
+        };
+        if error < best.error {
+            best = Best { error, step: made, state: state.clone() };
+            looks_in_vain = 0;
+        } else {
+            looks_in_vain += 1;
+        }
+        if course.has_diverged() {
+            stop = Stop::Diverged;
+            break;
+        }
+        if held_out.is_some() && looks_in_vain >= PATIENCE && made < planned {
+            stop = Stop::HeldOut;
+            break;
+        }
+    }
+    let after = work.psnr_db(&best.state, context)?;
+    // What is judged by its own loss alone may have begun better than it ever was later.
+    let shown_mean = |psnr: &[f64]| shown.iter().map(|&v| psnr[v]).sum::<f64>() / f64::from(round);
+    let (best, after) = match held_out.is_none() && shown_mean(&after) < shown_mean(&before) {
+        true => (Best { error: 0.0, step: 0, state: beginning }, before.clone()),
+        false => (best, after),
+    };
+    let report = Refinement {
+        iterations: plan.planned().unwrap_or(made),
+        made,
+        kept: best.step,
+        stop,
+        loss: [course.first.unwrap_or_default(), course.last],
+        psnr_db: [shown_mean(&before), shown_mean(&after)],
+        held_out: held_out.map(|v| HeldOut { view: views[v].name.clone(), psnr_db: [before[v], after[v]] }),
+        exposures: (0..views.len()).map(|v| best.state.exposure.factor(v)).collect(),
+        densified: work.densified(),
+        drawn_by: work.drawn_by(),
+    };
+    Ok((work.finished(&best.state, context), report))
+}
+
+/// Half the diagonal of the box that holds all centres, metres.
+fn half_diagonal_m(gaussians: &Gaussians) -> f32 {
+    let diagonal =
+        |(low, high): ([f32; 3], [f32; 3])| (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f32>().sqrt();
+    gaussians.bounds().map_or(1.0, |bounds| 0.5 * diagonal(bounds)).clamp(1e-3, 1e3)
+}
+
+/// Everything that steps change.
+#[derive(Clone, Debug)]
+struct State {
+    /// Of the originals.
+    parameters: Parameters,
+    /// Who follows them.
+    clones: Vec<Tied>,
+    exposure: Exposure,
+}
+
+impl State {
+    fn of(originals: &Gaussians, clones: &[Tied], views: usize) -> Self {
+        let parameters = Parameters::of(originals);
+        Self { parameters, clones: clones.to_vec(), exposure: Exposure::new(views) }
+    }
+}
+
+/// The state that was best, and after which step.
+struct Best {
+    error: f64,
+    step: u32,
+    state: State,
+}
+
+/// The first loss, and the mean of the last round.
+#[derive(Debug, Default)]
+struct Course {
+    recent: VecDeque<f64>,
+    first: Option<f64>,
+    last: f64,
+}
+
+impl Course {
+    fn push(&mut self, loss: f64, round: u32) {
+        self.first.get_or_insert(loss);
+        self.recent.push_back(loss);
+        if self.recent.len() > round as usize {
+            self.recent.pop_front();
+        }
+        self.last = self.recent.iter().sum::<f64>() / self.recent.len() as f64;
+    }
+
+    fn has_diverged(&self) -> bool {
+        self.first.is_some_and(|first| self.last > DIVERGED * first)
+    }
+}

@@ -1,0 +1,98 @@
+//! A view and a scene, and what makes them valid.
+
+use super::{Cloud, DepthMap, Mask, RgbImage, VehicleBox};
+use glam::{DVec3, Vec3};
+use vg_geometry::Camera;
+use vg_geometry::{Error, Result};
+
+/// Most views a scene may hold.
+pub const MAX_VIEWS: usize = 4096;
+
+/// One photograph: picture, camera, and which pixels show the vehicle. Clones share all that is per pixel.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// Name for messages and output files, for example the picture's file name.
+    pub name: String,
+    /// Intrinsics, distortion and `vehicle_from_camera`.
+    pub camera: Camera,
+    /// The picture, of the camera's size.
+    pub image: RgbImage,
+    /// Vehicle or not, of the camera's size; `None` where nobody said.
+    pub mask: Option<Mask>,
+    /// Measured planar depth in metres, of the camera's size.
+    pub depth: Option<DepthMap>,
+}
+
+/// Views of one vehicle in its own frame, and what else was measured of it.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// In the caller's order.
+    pub views: Vec<View>,
+    /// Points on the vehicle, where some were measured; priors that estimate the surface move it there.
+    pub cloud: Option<Cloud>,
+    /// The vehicle's box, where one was tracked or measured; [`crate::pipeline::Options::vehicle_size`] goes before it.
+    pub vehicle_box: Option<VehicleBox>,
+}
+
+impl View {
+    /// A view for what looks at cameras and masks alone: its picture is black.
+    pub fn without_picture(name: String, camera: Camera, mask: Option<Mask>) -> Result<Self> {
+        camera.validate("camera")?;
+        let (width, height) = (camera.width, camera.height);
+        let image = RgbImage::new(width, height, vec![[0; 3]; width as usize * height as usize])?;
+        Ok(Self { name, camera, image, mask, depth: None })
+    }
+
+    /// Camera valid, picture, mask and depth of the camera's size; `argument` names the view in the error.
+    pub fn validate(&self, argument: &str) -> Result<()> {
+        self.camera.validate(&format!("{argument}.camera"))?;
+        let expected = (self.camera.width, self.camera.height);
+        let same_size = |what: &str, width: u32, height: u32| {
+            if (width, height) == expected {
+                return Ok(());
+            }
+            Err(Error::argument(
+                format!("{argument}.{what}"),
+                format!("{width}x{height}"),
+                format!("the camera's size, {}x{}", expected.0, expected.1),
+            ))
+        };
+        same_size("image", self.image.width(), self.image.height())?;
+        if let Some(mask) = &self.mask {
+            same_size("mask", mask.width(), mask.height())?;
+        }
+        if let Some(depth) = &self.depth {
+            same_size("depth", depth.width(), depth.height())?;
+        }
+        Ok(())
+    }
+
+    /// The point at planar depth `z` metres behind the centre of pixel (u, v) of a pinhole view, vehicle frame
+    /// (paper eqs. `metric_point_ray`, `vehicle_point`).
+    pub fn lift(&self, u: u32, v: u32, z: f32) -> Vec3 {
+        let pixel = [f64::from(u) + 0.5, f64::from(v) + 0.5];
+        let [x, y] = self.camera.intrinsics.normalized_from_pixel(pixel);
+        let point_camera = DVec3::new(x, y, 1.0) * f64::from(z);
+        self.camera.vehicle_from_camera.transform_point(point_camera).as_vec3()
+    }
+
+    /// How errors name view number `index`.
+    pub fn argument(&self, index: usize) -> String {
+        if self.name.is_empty() {
+            format!("views[{index}]")
+        } else {
+            format!("views[{index}] ({})", self.name)
+        }
+    }
+}
+
+impl Scene {
+    /// At least one view, all valid.
+    pub fn validate(&self) -> Result<()> {
+        if self.views.is_empty() || self.views.len() > MAX_VIEWS {
+            return Err(Error::argument("views", self.views.len().to_string(), format!("1 to {MAX_VIEWS}")));
+        }
+        self.views.iter().enumerate().try_for_each(|(i, view)| view.validate(&view.argument(i)))?;
+        self.vehicle_box.map_or(Ok(()), |known| known.validate("vehicle_box"))
+    }
+}

@@ -1,0 +1,277 @@
+//! The backward pass: from the gradient of a picture to that of the Gaussians, the background and the pose.
+//!
+//! Stages: `blend` replays each tile onto its `tape` and walks it back, `sum` adds up what the tiles have for each
+//! splat, `project` goes back through the projection and the colour. The splats, their order and the lists of tiles
+//! are those of the forward pass. Everything is summed in an order that the picture decides, tile by tile and chunk by
+//! chunk: the same bytes for any number of threads.
+
+mod blend;
+mod color;
+mod project;
+mod tape;
+
+use super::bin::{self, Grid, Stripe, Window};
+use super::simd::Lanes;
+use super::splat::Splat;
+use super::tile::{TILE_HEIGHT, TILE_WIDTH, Tile};
+use super::{PROJECT_CHUNK, Scratch};
+use crate::gaussians::Gaussians;
+use crate::render::view::PinholeView;
+use crate::render::{Gradients, PictureGradient, PoseGradient, RenderOptions};
+pub(in crate::render) use blend::SplatSums;
+use blend::TileGradient;
+use glam::{DMat3, DVec3};
+pub(in crate::render) use project::Decided;
+use project::{CameraSums, Chunk};
+use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+use tape::Tape;
+use vg_geometry::Camera;
+use vg_geometry::progress::Watch;
+
+/// (tile, splat) pairs whose gradients are held at a time: 184 MB if all of them draw.
+const PAIR_BUDGET: u64 = 1 << 22;
+
+/// The picture's gradient is brought to this magnitude, exactly, by a power of two: with colours of at most 1e30 and
+/// 8192 x 8192 pixels no sum leaves f32, and entries 1e-30 of the largest still count.
+const LARGEST: f64 = 1.0 / (1 << 24) as f64;
+
+/// Wall time of each stage of one backward pass.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BackwardTimes {
+    /// Replaying the tiles and walking back.
+    pub blend: Duration,
+    /// Adding up the tiles' shares.
+    pub sum: Duration,
+    /// Projection and colour.
+    pub project: Duration,
+}
+
+/// Arrays that outlive a picture.
+#[derive(Debug, Default)]
+pub(super) struct BackwardScratch {
+    tiles: Vec<TileShare>,
+    /// `[n]`
+    sums: Vec<SplatSums>,
+    /// One per thread at work.
+    workers: Mutex<Vec<Box<Worker>>>,
+}
+
+/// What one tile has for the splats that drew in it, farthest first.
+#[derive(Debug, Default)]
+struct TileShare {
+    splats: Vec<u32>,
+    sums: Vec<SplatSums>,
+    background: [f64; 3],
+}
+
+/// What a thread needs for a tile.
+#[derive(Debug)]
+struct Worker {
+    tile: Tile,
+    tape: Tape,
+    gradient: TileGradient,
+}
+
+/// Of what has been projected and sorted into `scratch`; `binned` says that its stripes list the whole picture.
+/// `largest` is the largest magnitude in `gradient`. Of stopped work `out` holds nothing in particular.
+pub(super) fn backward<S: Lanes>(
+    simd: S,
+    gaussians: &Gaussians,
+    camera: &Camera,
+    options: &RenderOptions,
+    pair_budget: u64,
+    watch: &Watch,
+    scratch: &mut Scratch,
+    binned: bool,
+    (gradient, largest): (&PictureGradient, f32),
+    out: &mut Gradients,
+) -> BackwardTimes {
+    let scale = scale_of(largest);
+    let grid = Grid::new(camera.width, camera.height);
+    let Scratch { splats, order, bounds, stripes, backward, .. } = scratch;
+    let BackwardScratch { tiles, sums, workers } = backward;
+    sums.clear();
+    sums.resize(gaussians.len(), [0.0; 10]);
+
+    let mut times = BackwardTimes::default();
+    let mut background = [0.0; 3];
+    let windows = bin::windows(grid, bounds, pair_budget.min(PAIR_BUDGET));
+    let whole = windows.len() == 1;
+    for window in windows {
+        let start = Instant::now();
+        if !(whole && binned) {
+            bin::bin(&window, order, bounds, stripes);
+        }
+        walk_tiles(simd, &window, stripes, splats, options, gradient, scale, watch, workers, tiles);
+        if watch.is_stopped() {
+            return times;
+        }
+        let walked = Instant::now();
+        add_shares(tiles, sums);
+        for tile in tiles.iter() {
+            for c in 0..3 {
+                background[c] += tile.background[c];
+            }
+        }
+        times.blend += walked - start;
+        times.sum += walked.elapsed();
+    }
+
+    let start = Instant::now();
+    let shares = Shares { sums, background, scale };
+    back_to_gaussians(simd, gaussians, camera, options, &shares, |i| Decided::of(&splats[i]), out);
+    times.project = start.elapsed();
+    times
+}
+
+/// What pixels have for Gaussians and the background: dL/d(what they show).
+pub(in crate::render) struct Shares<'a> {
+    /// `[n]`
+    pub(in crate::render) sums: &'a [SplatSums],
+    pub(in crate::render) background: [f64; 3],
+    /// The picture's gradient was brought to this multiple.
+    pub(in crate::render) scale: f64,
+}
+
+/// From pixels to what made them: through the projection and the colour of each Gaussian that drew.
+pub(super) fn back_to_gaussians<S: Lanes>(
+    simd: S,
+    gaussians: &Gaussians,
+    camera: &Camera,
+    options: &RenderOptions,
+    shares: &Shares,
+    decided: impl Fn(usize) -> Decided + Sync,
+    out: &mut Gradients,
+) {
+    let view = PinholeView::new(camera, options, gaussians.sh_degree());
+    let unscale = 1.0 / shares.scale;
+    let total = project_all(simd, &view, gaussians, decided, shares.sums, unscale, out);
+    out.background = shares.background.map(|v| v * unscale);
+    out.pose = pose_gradient(camera, &total);
+}
+
+/// The power of two that brings `largest` to about [`LARGEST`].
+pub(in crate::render) fn scale_of(largest: f32) -> f64 {
+    let ratio = if largest > 0.0 { LARGEST / f64::from(largest) } else { 1.0 };
+    f64::from_bits(ratio.to_bits() & 0xfff0_0000_0000_0000)
+}
+
+/// Replays every tile of `window` and walks it back.
+fn walk_tiles<S: Lanes>(
+    simd: S,
+    window: &Window,
+    stripes: &[Stripe],
+    splats: &[Splat],
+    options: &RenderOptions,
+    gradient: &PictureGradient,
+    scale: f64,
+    watch: &Watch,
+    workers: &Mutex<Vec<Box<Worker>>>,
+    tiles: &mut Vec<TileShare>,
+) {
+    let columns = window.columns.len();
+    tiles.resize_with(window.rows.len() * columns, TileShare::default);
+    tiles.par_iter_mut().with_max_len(1).enumerate().for_each(|(i, share)| {
+        if watch.is_stopped() {
+            return;
+        }
+        let (row, column) = (window.rows.start + i / columns, window.columns.start + i % columns);
+        let origin = [column * TILE_WIDTH, row * TILE_HEIGHT];
+        let list = bin::stripe_of(stripes, row).tile(column, row);
+        let pool = || workers.lock().unwrap_or_else(PoisonError::into_inner);
+        let spare = pool().pop();
+        let mut worker = spare.unwrap_or_else(Worker::new);
+        let Worker { tile, tape, gradient: behind } = &mut *worker;
+        let TileShare { splats: ids, sums, background } = share;
+        ids.clear();
+        sums.clear();
+        tape.clear();
+        tile.clear_part(gradient.width as usize - origin[0], gradient.height as usize - origin[1]);
+        simd.vectorize(
+            #[inline(always)]
+            || super::blend::blend(simd, tile, origin, list, splats, options.max_alpha, tape),
+        );
+        *background = simd.vectorize(
+            #[inline(always)]
+            || behind.start((tile, tape), origin, options, gradient, scale),
+        );
+        simd.vectorize(
+            #[inline(always)]
+            || behind.walk(simd, tape, origin, splats, options.max_alpha, ids, sums),
+        );
+        pool().push(worker);
+    });
+}
+
+impl Worker {
+    fn new() -> Box<Self> {
+        Box::new(Self { tile: Tile::new(), tape: Tape::new(), gradient: TileGradient::new() })
+    }
+}
+
+/// Adds the tiles' shares to `sums`, in the order of the tiles. Each task has a range of splats to itself and looks
+/// through all tiles: how the ranges are cut changes no sum.
+fn add_shares(tiles: &[TileShare], sums: &mut [SplatSums]) {
+    let len = sums.len().div_ceil(rayon::current_num_threads()).max(1);
+    sums.par_chunks_mut(len).enumerate().for_each(|(i, sums)| {
+        let first = (i * len) as u32;
+        for tile in tiles {
+            for (&splat, share) in tile.splats.iter().zip(&tile.sums) {
+                // Of a splat before the range it is huge.
+                let at = splat.wrapping_sub(first) as usize;
+                if let Some(sum) = sums.get_mut(at) {
+                    for k in 0..10 {
+                        sum[k] += share[k];
+                    }
+                }
+            }
+        }
+    });
+}
+
+fn project_all<S: Lanes>(
+    simd: S,
+    view: &PinholeView,
+    gaussians: &Gaussians,
+    decided: impl Fn(usize) -> Decided + Sync,
+    sums: &[SplatSums],
+    unscale: f64,
+    out: &mut Gradients,
+) -> CameraSums {
+    out.resize(gaussians);
+    let stride = gaussians.sh_stride();
+    let chunks = out
+        .means
+        .par_chunks_mut(PROJECT_CHUNK)
+        .zip(out.rotations.par_chunks_mut(PROJECT_CHUNK))
+        .zip(out.scales.par_chunks_mut(PROJECT_CHUNK))
+        .zip(out.opacities.par_chunks_mut(PROJECT_CHUNK))
+        .zip(out.sh.par_chunks_mut(PROJECT_CHUNK * stride))
+        .zip(sums.par_chunks(PROJECT_CHUNK));
+    let cameras: Vec<CameraSums> = chunks
+        .enumerate()
+        .map(|(i, (((((means, rotations), scales), opacities), sh), sums))| {
+            let chunk = Chunk { first: i * PROJECT_CHUNK, means, rotations, scales, opacities, sh };
+            simd.vectorize(
+                #[inline(always)]
+                || project::project(view, gaussians, &decided, sums, unscale, chunk),
+            )
+        })
+        .collect();
+    let mut total = [0.0; 15];
+    for camera in cameras {
+        for k in 0..15 {
+            total[k] += camera[k];
+        }
+    }
+    total
+}
+
+fn pose_gradient(camera: &Camera, total: &CameraSums) -> PoseGradient {
+    let pose = &camera.vehicle_from_camera;
+    let rows = |k: usize| DVec3::new(total[k], total[k + 1], total[k + 2]);
+    let entries = DMat3::from_cols(rows(0), rows(3), rows(6)).transpose();
+    PoseGradient::new(pose, entries, rows(9), rows(12))
+}

@@ -1,0 +1,64 @@
+//! The fast renderer for callers that may lose interest: rows and tiles that are left are left out once the work is
+//! stopped.
+
+use super::{CpuRenderer, Level, StageTimes, draw};
+use crate::gaussians::Gaussians;
+use crate::render::{RenderOptions, Rendered, Renderer};
+use vg_geometry::Camera;
+use vg_geometry::Result;
+use vg_geometry::progress::Watch;
+
+/// A renderer whose pictures can be stopped: with [`Error::Cancelled`](vg_geometry::Error::Cancelled), and a target that holds
+/// nothing in particular.
+#[derive(Clone, Copy, Debug)]
+pub struct Watched<'a> {
+    pub(super) renderer: &'a CpuRenderer,
+    pub(super) watch: &'a Watch,
+}
+
+impl CpuRenderer {
+    /// The same renderer under `watch`.
+    pub fn watched<'a>(&'a self, watch: &'a Watch) -> Watched<'a> {
+        Watched { renderer: self, watch }
+    }
+}
+
+impl Watched<'_> {
+    /// As [`CpuRenderer::render_into`].
+    pub fn render_into(
+        &self,
+        gaussians: &Gaussians,
+        camera: &Camera,
+        options: &RenderOptions,
+        target: &mut Rendered,
+    ) -> Result<StageTimes> {
+        let Self { renderer, watch } = *self;
+        camera.validate("camera")?;
+        options.validate()?;
+        watch.check()?;
+        if !camera.distortion.is_none() {
+            *target = renderer.lens_map(camera)?.render(self, gaussians, camera, options)?;
+            return Ok(StageTimes::default());
+        }
+        let mut scratch = renderer.pool().pop().unwrap_or_default();
+        let budget = renderer.pair_budget;
+        let times = match renderer.level {
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2(simd) => draw(simd, gaussians, camera, options, budget, watch, &mut scratch, target),
+            Level::Portable(simd) => {
+                draw(simd, gaussians, camera, options, budget, watch, &mut scratch, target)
+            }
+        };
+        renderer.pool().push(scratch);
+        watch.check()?;
+        Ok(times)
+    }
+}
+
+impl Renderer for Watched<'_> {
+    fn render(&self, gaussians: &Gaussians, camera: &Camera, options: &RenderOptions) -> Result<Rendered> {
+        let mut target = Rendered::default();
+        self.render_into(gaussians, camera, options, &mut target)?;
+        Ok(target)
+    }
+}

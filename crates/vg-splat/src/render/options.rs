@@ -1,0 +1,95 @@
+//! What may differ between two renders of the same Gaussians; the defaults are INRIA's and gsplat's.
+
+use vg_geometry::{Error, Result};
+
+/// What is behind the vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Background {
+    /// A colour, RGB in [0, 1]; the picture is opaque.
+    Color([f32; 3]),
+    /// Nothing: colour is premultiplied by the picture's own alpha.
+    Transparent,
+}
+
+/// What a depth pixel means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DepthMode {
+    /// Sum of T alpha z over alpha: metres, 0 where alpha is 0.
+    Expected,
+    /// Sum of T alpha z, not divided (what the gradients are taken of).
+    Accumulated,
+}
+
+/// Render settings; `RenderOptions::default()` is what everything is measured with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RenderOptions {
+    /// What shows where the vehicle does not.
+    pub background: Background,
+    /// Variance added to each projected Gaussian, pixels^2.
+    pub blur: f32,
+    /// Compensate the opacity for the added variance (Mip-splatting's screen-space filter).
+    pub antialiased: bool,
+    /// Gaussians nearer than this (their centre's z, metres) are not drawn.
+    pub near: f32,
+    /// Gaussians farther than this (their centre's z, metres) are not drawn.
+    pub far: f32,
+    /// Largest alpha one Gaussian may have in one pixel.
+    pub max_alpha: f32,
+    /// SH bands above this are left out; more than the Gaussians have changes nothing.
+    pub sh_degree: u8,
+    /// What `Rendered::depth` means.
+    pub depth_mode: DepthMode,
+}
+
+/// An alpha below this is not drawn.
+pub const ALPHA_THRESHOLD: f32 = 1.0 / 255.0;
+
+/// A pixel is finished, without the Gaussian at hand, where its transmittance would fall to this.
+pub const TRANSMITTANCE_THRESHOLD: f32 = 1e-4;
+
+/// Floor of the antialiased opacity compensation.
+pub const MIN_COMPENSATION: f32 = 0.005;
+
+/// x/z and y/z are clamped to the image plus this part of its size before the Jacobian is taken.
+pub const PROJECTION_MARGIN: f32 = 0.15;
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self {
+            background: Background::Color([1.0; 3]),
+            blur: 0.3,
+            antialiased: false,
+            near: 0.01,
+            far: 1e10,
+            max_alpha: 0.99,
+            sh_degree: 3,
+            depth_mode: DepthMode::Expected,
+        }
+    }
+}
+
+impl RenderOptions {
+    /// Each field in its range.
+    pub fn validate(&self) -> Result<()> {
+        let check = |name: &str, value: f32, range: std::ops::RangeInclusive<f32>| {
+            if range.contains(&value) {
+                return Ok(());
+            }
+            Err(Error::argument(
+                format!("options.{name}"),
+                value.to_string(),
+                format!("{} to {}", range.start(), range.end()),
+            ))
+        };
+        if let Background::Color(rgb) = self.background {
+            for value in rgb {
+                check("background", value, 0.0..=1.0)?;
+            }
+        }
+        // Below 1e-4 px^2 a distant Gaussian could fall between pixel centres without a trace.
+        check("blur", self.blur, 1e-4..=100.0)?;
+        check("near", self.near, 1e-6..=1e10)?;
+        check("far", self.far, self.near..=1e10)?;
+        check("max_alpha", self.max_alpha, 0.01..=0.9999)
+    }
+}
