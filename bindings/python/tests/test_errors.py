@@ -266,7 +266,7 @@ try:
     vg._native._panic_on_a_worker_thread()
 except vg.VgError as error:
     assert error.code is vg.Status.INTERNAL, error.code
-    assert str(error).startswith("internal error: made for a test (src"), error
+    assert str(error).startswith("internal error: made for a test (bindings/python/src"), error
 else:
     raise SystemExit("no error")
 """

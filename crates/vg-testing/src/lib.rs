@@ -18,12 +18,17 @@ pub mod tools;
 pub mod vehicle;
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 use vg::render::Rendered;
 
 /// The repository.
 pub fn root() -> &'static Path {
-    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+    static ROOT: LazyLock<PathBuf> = LazyLock::new(|| {
+        let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+        here.ancestors().nth(2).expect("crates/vg-testing lies two folders deep").to_owned()
+    });
+    &ROOT
 }
 
 /// Prints a line that the test harness does not swallow: why something was skipped.

@@ -20,8 +20,8 @@ pub const WORTH_A_DEVICE: usize = 20_000;
 ///
 /// ```
 /// # use std::sync::Arc;
-/// # use vg::render::{AssetRenderer, Backend, RenderOptions};
-/// # fn draw(gaussians: vg::Gaussians, cameras: &[vg::Camera]) -> vg::Result<()> {
+/// # use vg_splat::render::{AssetRenderer, Backend, RenderOptions};
+/// # fn draw(gaussians: vg_splat::Gaussians, cameras: &[vg_geometry::Camera]) -> vg_geometry::Result<()> {
 /// let ready = AssetRenderer::new(Arc::new(gaussians), Backend::Auto)?;
 /// println!("{}", ready.choice());
 /// for camera in cameras {

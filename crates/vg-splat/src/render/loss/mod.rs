@@ -4,9 +4,9 @@
 //! picture. It returns `weight` times that mean and adds the gradient of what it returns to the picture's:
 //!
 //! ```
-//! # use vg::render::{CpuRenderer, RenderOptions, loss::{self, Term}};
-//! # let (gaussians, camera) = (vg::Gaussians::default(), vg::Camera::pinhole(16, 16,
-//! #     vg::geometry::Intrinsics { fx: 9.0, fy: 9.0, cx: 8.0, cy: 8.0 }, vg::Pose::IDENTITY)?);
+//! # use vg_splat::render::{CpuRenderer, RenderOptions, loss::{self, Term}};
+//! # let (gaussians, camera) = (vg_splat::Gaussians::default(), vg_geometry::Camera::pinhole(16, 16,
+//! #     vg_geometry::Intrinsics { fx: 9.0, fy: 9.0, cx: 8.0, cy: 8.0 }, vg_geometry::Pose::IDENTITY)?);
 //! # let (photograph, mask) = (vec![[0.5; 3]; 256], vec![1.0; 256]);
 //! let (mut picture, mut of_picture, mut gradients) = Default::default();
 //! let mut value = 0.0;
@@ -22,7 +22,7 @@
 //!         Ok(())
 //!     },
 //! )?;
-//! # Ok::<(), vg::Error>(())
+//! # Ok::<(), vg_geometry::Error>(())
 //! ```
 
 mod color;
