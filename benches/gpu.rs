@@ -113,7 +113,8 @@ fn row(gpu: &GpuRenderer, cpu: &CpuRenderer, gaussians: &Gaussians, width: u32, 
         for (renderer, times) in renderers.into_iter().zip(&mut times[4..]) {
             let mut picture = Rendered::default();
             let targets = (&mut picture, &mut of_picture, &mut gradients);
-            let way = || renderer.both_ways(gaussians, camera, &options, targets, &mut mean_square).unwrap();
+            let way =
+                || renderer.forward_backward(gaussians, camera, &options, targets, &mut mean_square).unwrap();
             times.push(timed(way).1);
         }
     }

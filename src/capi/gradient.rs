@@ -240,7 +240,7 @@ pub unsafe extern "C" fn vg_render_backward(
                             // What was copied before is no longer there: the renderer empties it.
                             planes.copy(of_picture)
                         };
-                        renderer.both_ways(gaussians, &camera, &settings, targets, &mut loss)
+                        renderer.forward_backward(gaussians, &camera, &settings, targets, &mut loss)
                     };
                     let on_this_thread = |()| planes.loss.map_or(0, |loss| loss(planes.loss_user));
                     shop.threads.run_asking(draw, on_this_thread)?;

@@ -61,7 +61,7 @@ static void child(vg_context *const contexts[2], const unsigned char *expected) 
         vg_error *error = NULL;
         CHECK(draw(contexts[i], picture, &error) == VG_STATUS_ARGUMENT);
         CHECK(strstr(vg_error_message(error), "options.context: made in process ") != NULL);
-        CHECK(strstr(vg_error_message(error), "is a fork; allowed: one that was made after the fork") != NULL);
+        CHECK(strstr(vg_error_message(error), "is a fork of it; allowed: one made after the fork") != NULL);
         vg_error_free(error);
         CHECK(vg_context_threads(contexts[i]) == 0);
         vg_context_free(contexts[i]);

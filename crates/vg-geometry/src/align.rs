@@ -20,7 +20,7 @@ impl Similarity {
     /// The transform that changes nothing.
     pub const IDENTITY: Self = Self { scale: 1.0, rotation: DMat3::IDENTITY, translation: DVec3::ZERO };
 
-    /// From a row-major 4x4 matrix whose upper-left block is a scaled rotation and whose last row is 0 0 0 1.
+    /// Converts a row-major 4x4 matrix whose upper-left block is a scaled rotation and whose last row is 0 0 0 1.
     pub fn from_row_major(argument: &str, m: &[f64; 16]) -> Result<Self> {
         if m[12] != 0.0 || m[13] != 0.0 || m[14] != 0.0 || m[15] != 1.0 {
             return Err(Error::argument(argument, format!("last row {:?}", &m[12..]), "0 0 0 1"));
@@ -39,25 +39,25 @@ impl Similarity {
         Ok(Self { scale, rotation: pose.rotation, translation: pose.translation })
     }
 
-    /// Row-major 4x4.
+    /// The row-major 4x4 matrix.
     pub fn to_row_major(&self) -> [f64; 16] {
         let r = (self.rotation * self.scale).transpose().to_cols_array();
         let t = self.translation;
         [r[0], r[1], r[2], t.x, r[3], r[4], r[5], t.y, r[6], r[7], r[8], t.z, 0.0, 0.0, 0.0, 1.0]
     }
 
-    /// Its inverse.
+    /// The inverse similarity.
     pub fn inverse(&self) -> Self {
         let (scale, rotation) = (self.scale.recip(), self.rotation.transpose());
         Self { scale, rotation, translation: -scale * (rotation * self.translation) }
     }
 
-    /// A point.
+    /// Maps a point.
     pub fn transform_point(&self, p: DVec3) -> DVec3 {
         self.scale * (self.rotation * p) + self.translation
     }
 
-    /// `to_from_camera` of `from_from_camera`: the camera keeps its own axes; its position is scaled.
+    /// Maps `from_from_camera` to `to_from_camera`: the camera keeps its own axes; its position is scaled.
     pub fn transform_pose(&self, pose: &Pose) -> Pose {
         Pose { rotation: self.rotation * pose.rotation, translation: self.transform_point(pose.translation) }
     }
@@ -67,7 +67,7 @@ impl Similarity {
     pub fn umeyama(from: &[DVec3], to: &[DVec3]) -> Result<Self> {
         if from.len() != to.len() {
             let found = format!("{} to match {}", from.len(), to.len());
-            return Err(Error::argument("points", found, "equally many"));
+            return Err(Error::argument("points", found, "two lists of equal length"));
         }
         if from.len() < 3 {
             return Err(Error::argument("points", format!("{} in each list", from.len()), "at least 3"));

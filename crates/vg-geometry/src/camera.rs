@@ -22,7 +22,7 @@ pub struct Intrinsics {
 }
 
 impl Intrinsics {
-    /// The smaller focal length, pixels: at planar depth z a pixel is z over this wide, in its wider direction.
+    /// The smaller focal length, pixels: at planar depth z the wider side of a pixel is z over this.
     pub fn smaller_focal(&self) -> f64 {
         self.fx.min(self.fy)
     }
@@ -32,18 +32,18 @@ impl Intrinsics {
         [self.fx, 0.0, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0]
     }
 
-    /// Pixel coordinates of normalised ones (x/z, y/z).
+    /// Converts normalised coordinates (x/z, y/z) to pixel coordinates.
     pub fn pixel_from_normalized(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.fx * x + self.cx, self.fy * y + self.cy]
     }
 
-    /// Normalised coordinates (x/z, y/z) of pixel coordinates.
+    /// Converts pixel coordinates to normalised coordinates (x/z, y/z).
     pub fn normalized_from_pixel(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         [(u - self.cx) / self.fx, (v - self.cy) / self.fy]
     }
 }
 
-/// COLMAP's camera models that are understood, with COLMAP's ids.
+/// The supported camera models of COLMAP, with COLMAP's ids.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(i32)]
 pub enum CameraModel {
@@ -75,12 +75,12 @@ impl CameraModel {
         Self::FullOpenCv,
     ];
 
-    /// From COLMAP's number.
+    /// The model with COLMAP's id `id`.
     pub fn from_id(id: i32) -> Option<Self> {
         Self::ALL.into_iter().find(|m| *m as i32 == id)
     }
 
-    /// From COLMAP's (and nerfstudio's) name.
+    /// The model with COLMAP's (and nerfstudio's) name `name`.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|m| m.name() == name)
     }
@@ -98,7 +98,7 @@ impl CameraModel {
         }
     }
 
-    /// How many parameters the model has.
+    /// The number of parameters of the model.
     pub fn parameter_count(self) -> usize {
         match self {
             Self::SimplePinhole => 3,
@@ -110,7 +110,7 @@ impl CameraModel {
     }
 }
 
-/// Which of OpenCV's two lens models a calibration is of: the numbers alone do not tell.
+/// OpenCV's two lens models. The coefficients alone do not reveal which one a calibration uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OpenCvModel {
     /// `cv::calibrateCamera`: k1, k2, p1, p2, k3, k4, k5, k6.
@@ -119,12 +119,12 @@ pub enum OpenCvModel {
     Fisheye,
 }
 
-/// A camera and where it stands.
+/// A camera and its pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Columns.
+    /// Width of the image, pixels.
     pub width: u32,
-    /// Rows.
+    /// Height of the image, pixels.
     pub height: u32,
     /// Pinhole part.
     pub intrinsics: Intrinsics,
@@ -147,7 +147,7 @@ impl Camera {
         Ok(camera)
     }
 
-    /// From a COLMAP model and its parameters, in COLMAP's order.
+    /// Makes a checked camera from a COLMAP model and its parameters, in COLMAP's order.
     pub fn from_colmap(
         argument: &str,
         model: CameraModel,
@@ -188,16 +188,17 @@ impl Camera {
         Ok(camera)
     }
 
-    /// From an OpenCV calibration: the camera matrix `k`, `[3][3]` row-major, and the distortion coefficients.
+    /// Makes a checked camera from an OpenCV calibration: the camera matrix `k`, `[3][3]` row-major, and the distortion
+    /// coefficients.
     ///
-    /// OpenCV puts the centre of the top-left pixel at (0, 0), we at (0.5, 0.5): half a pixel is added to the principal
-    /// point. `distortion` holds 0, 4, 5 or 8 numbers in OpenCV's order (k1, k2, p1, p2, k3, k4, k5, k6), missing ones
-    /// zero; 12 or 14 only where the rest is zero. Fisheye takes 0 or 4; without any, its picture is equidistant still,
-    /// not a pinhole's.
+    /// OpenCV puts the centre of the top-left pixel at (0, 0), this library at (0.5, 0.5): half a pixel is added to the
+    /// principal point. `distortion` holds 0, 4, 5 or 8 numbers in OpenCV's order (k1, k2, p1, p2, k3, k4, k5, k6), the
+    /// missing ones being zero; 12 or 14 are accepted only where the rest is zero. A fisheye takes 0 or 4; without
+    /// coefficients it is equidistant, not a pinhole.
     ///
     /// # Errors
-    /// A skew, a last row that is not 0 0 1, a thin-prism or tilted-sensor term, another count, and whatever
-    /// [`Camera::validate`] refuses; `argument` names the camera.
+    /// A skew, a last row that is not 0 0 1, a thin-prism or tilted-sensor term, another number of coefficients, and
+    /// whatever [`Camera::validate`] rejects; `argument` names the camera.
     pub fn from_opencv(
         argument: &str,
         k: &[f64; 9],
@@ -218,7 +219,8 @@ impl Camera {
         Ok(camera)
     }
 
-    /// Size 1 to [`MAX_SIDE`], focal lengths positive, everything finite and not too far away; `argument` names it in the error.
+    /// Checks that the size is 1 to [`MAX_SIDE`], the focal lengths are positive, and everything is finite and not too
+    /// far away; `argument` names the camera in the error.
     pub fn validate(&self, argument: &str) -> Result<()> {
         let Self { width, height, intrinsics: Intrinsics { fx, fy, cx, cy }, .. } = *self;
         if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
@@ -228,7 +230,7 @@ impl Camera {
                 format!("1x1 to {MAX_SIDE}x{MAX_SIDE}"),
             ));
         }
-        // Outside these the projection leaves the range of f32 before it leaves the range of use.
+        // Outside this range the projection can overflow or underflow f32.
         const FOCAL: std::ops::RangeInclusive<f64> = 1e-3..=1e9;
         if !FOCAL.contains(&fx) || !FOCAL.contains(&fy) {
             return Err(Error::argument(
@@ -266,7 +268,7 @@ impl Camera {
                 "finite numbers",
             ));
         }
-        // From farther away, what is lifted out of the picture leaves the range of f32.
+        // From farther away, points lifted from the picture leave the range of f32.
         const DISTANCE: f64 = 1e12;
         if self.vehicle_from_camera.translation.abs().max_element() > DISTANCE {
             return Err(Error::argument(
@@ -278,12 +280,12 @@ impl Camera {
         Ok(())
     }
 
-    /// Where the camera stands in the vehicle frame, metres.
+    /// The camera's position in the vehicle frame, metres.
     pub fn center(&self) -> DVec3 {
         self.vehicle_from_camera.translation
     }
 
-    /// Pixel of a point in the camera frame, or `None` on or behind the camera plane.
+    /// Projects a point of the camera frame to its pixel; `None` on or behind the camera plane.
     pub fn project(&self, point_camera: DVec3) -> Option<[f64; 2]> {
         if point_camera.z <= 0.0 {
             return None;
@@ -292,14 +294,14 @@ impl Camera {
         Some(self.intrinsics.pixel_from_normalized(self.distortion.distort(normalized)))
     }
 
-    /// Direction (x/z, y/z, 1) in the camera frame of a pixel, or `None` where the lens has no such ray.
+    /// Direction (x/z, y/z, 1) of a pixel's ray in the camera frame; `None` where the lens has no such ray.
     pub fn ray(&self, pixel: [f64; 2]) -> Option<DVec3> {
         let [x, y] = self.distortion.undistort(self.intrinsics.normalized_from_pixel(pixel))?;
         Some(DVec3::new(x, y, 1.0))
     }
 
-    /// The camera of the part of the picture that is `width` x `height` pixels large and whose top-left pixel is the
-    /// one in column `x`, row `y`. Every point of the scene stays in the pixel that shows it.
+    /// The camera of the `width` x `height` part of the picture whose top-left pixel is in column `x`, row `y`. Every
+    /// point of the scene stays in its pixel.
     ///
     /// # Errors
     /// The part is empty or does not lie inside the picture.
@@ -321,7 +323,7 @@ impl Camera {
         Ok(camera)
     }
 
-    /// [`Camera::scaled_to`] for a size that nobody has checked.
+    /// Checked [`Camera::scaled_to`].
     ///
     /// # Errors
     /// The size is not 1 to [`MAX_SIDE`], or takes the focal lengths out of what [`Camera::validate`] accepts.
@@ -331,7 +333,7 @@ impl Camera {
         Ok(camera)
     }
 
-    /// The same camera with the picture resized to `width` x `height`, which are not checked.
+    /// This camera with its picture resized to `width` x `height`, which are not checked.
     pub fn scaled_to(&self, width: u32, height: u32) -> Self {
         let (sx, sy) = (f64::from(width) / f64::from(self.width), f64::from(height) / f64::from(self.height));
         let i = self.intrinsics;
@@ -346,7 +348,7 @@ impl Camera {
 
 fn opencv_intrinsics(argument: &str, k: &[f64; 9]) -> Result<Intrinsics> {
     let [fx, skew, cx, below, fy, cy, last @ ..] = *k;
-    // NaN is not equal to anything, itself included, and is refused here.
+    // NaN is unequal to everything, so it is rejected here.
     if skew != 0.0 || below != 0.0 || last != [0.0, 0.0, 1.0] {
         return Err(Error::argument(
             format!("{argument}.k"),
@@ -361,9 +363,9 @@ fn opencv_distortion(argument: &str, given: &[f64], model: OpenCvModel) -> Resul
     let argument = format!("{argument}.distortion");
     let (counts, allowed): (&[usize], _) = match model {
         OpenCvModel::Standard => {
-            (&[0, 4, 5, 8, 12, 14], "0, 4, 5 or 8, or 12 or 14 with zeros behind the 8th")
+            (&[0, 4, 5, 8, 12, 14], "0, 4, 5 or 8, or 12 or 14 with zeros after the 8th")
         }
-        OpenCvModel::Fisheye => (&[0, 4], "0 or 4 of a fisheye"),
+        OpenCvModel::Fisheye => (&[0, 4], "0 or 4 for a fisheye"),
     };
     if !counts.contains(&given.len()) {
         return Err(Error::argument(argument, format!("{} numbers", given.len()), allowed));
@@ -373,7 +375,7 @@ fn opencv_distortion(argument: &str, given: &[f64], model: OpenCvModel) -> Resul
         return Ok(Distortion::Fisheye { k: [at(0), at(1), at(2), at(3)] });
     }
     if let Some(i) = (8..given.len()).find(|&i| given[i] != 0.0) {
-        let allowed = "0: thin prisms and tilted sensors are not understood";
+        let allowed = "0: thin-prism and tilted-sensor terms are not supported";
         return Err(Error::argument(format!("{argument}[{i}]"), given[i].to_string(), allowed));
     }
     let brown = Distortion::Brown { k: [at(0), at(1), at(4), at(5), at(6), at(7)], p: [at(2), at(3)] };
@@ -409,7 +411,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_from_where_nothing_can_be_lifted_is_refused() {
+    fn a_camera_too_far_away_to_lift_points_is_refused() {
         let at = |x: f64| {
             let vehicle_from_camera = Pose { translation: DVec3::new(0.0, x, 0.0), ..Pose::IDENTITY };
             Camera { vehicle_from_camera, ..camera() }
@@ -435,7 +437,7 @@ mod tests {
     }
 
     #[test]
-    fn a_resized_camera_is_the_scaled_one_and_a_size_that_no_camera_has_is_refused() {
+    fn a_resized_camera_is_the_scaled_one_and_a_size_out_of_range_is_refused() {
         assert_eq!(camera().resized(320, 120).unwrap(), camera().scaled_to(320, 120));
         for (width, height) in [(0, 480), (640, 0), (MAX_SIDE + 1, 480)] {
             refused(camera().resized(width, height), "resized.size: ");
@@ -450,7 +452,7 @@ mod tests {
         Camera::from_opencv("views[1].camera", k, distortion, model, 640, 480, Pose::IDENTITY)
     }
 
-    /// Pixel of a point as OpenCV's documentation of calib3d has it, top-left pixel's centre at (0, 0).
+    /// Pixel of a point by OpenCV's documentation of calib3d, with the centre of the top-left pixel at (0, 0).
     fn opencv_pixel(d: [f64; 8], [x, y, z]: [f64; 3]) -> [f64; 2] {
         let [k1, k2, p1, p2, k3, k4, k5, k6] = d;
         let (x, y) = (x / z, y / z);
@@ -462,7 +464,7 @@ mod tests {
         [K[0] * x2 + K[2], K[4] * y2 + K[5]]
     }
 
-    /// The same of its documentation of the fisheye module.
+    /// Pixel of a point by OpenCV's documentation of the fisheye module.
     fn opencv_fisheye_pixel([k1, k2, k3, k4]: [f64; 4], [x, y, z]: [f64; 3]) -> [f64; 2] {
         let (a, b) = (x / z, y / z);
         let r = (a.powi(2) + b.powi(2)).sqrt();
@@ -515,14 +517,14 @@ mod tests {
 
     #[test]
     fn the_centre_of_opencv_s_first_pixel_is_ours() {
-        // A principal point on that pixel's centre: (0, 0) there, (0.5, 0.5) here.
+        // The principal point is that pixel's centre: (0, 0) in OpenCV, (0.5, 0.5) here.
         let k = [500.0, 0.0, 0.0, 0.0, 500.0, 0.0, 0.0, 0.0, 1.0];
         let camera = opencv(&k, &[], OpenCvModel::Standard).unwrap();
         assert_eq!(camera.project(DVec3::Z), Some([0.5, 0.5]));
     }
 
     #[test]
-    fn calibrations_that_are_not_understood_are_refused_by_name() {
+    fn unsupported_calibrations_are_refused_by_name() {
         for (i, value) in [(1, 0.3), (3, 0.1), (6, 1e-9), (7, 1.0), (8, 2.0), (1, f64::NAN), (8, f64::NAN)] {
             let mut k = K;
             k[i] = value;

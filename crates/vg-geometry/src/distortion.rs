@@ -1,12 +1,12 @@
 //! Lens distortion on normalised image coordinates (x/z, y/z), in COLMAP's parametrisation.
 
-/// Rays at 90 degrees have no place on a pinhole image plane; stop a little before, at 89.
+/// Largest angle of a ray, 89 degrees: at 90 it does not meet a pinhole's image plane.
 const MAX_THETA: f64 = 1.553;
 
-/// A determinant of d distorted / d undistorted that is not above this means a fold.
+/// The lens model is folded where the determinant of d distorted / d undistorted is not above this.
 const MIN_DETERMINANT: f64 = 1e-9;
 
-/// How a lens bends the pinhole picture. Names and formulas are COLMAP's (`models.h`).
+/// Distortion of a lens against a pinhole. Names and formulas are COLMAP's (`models.h`).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub enum Distortion {
     /// A pinhole.
@@ -37,7 +37,7 @@ impl Distortion {
         }
     }
 
-    /// Distorted normalised coordinates of undistorted ones.
+    /// Maps undistorted normalised coordinates to distorted ones.
     pub fn distort(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         match *self {
             Self::None => [x, y],
@@ -58,9 +58,8 @@ impl Distortion {
         }
     }
 
-    /// Undistorted normalised coordinates of distorted ones, or `None` where no ray in front of the camera maps
-    /// there or the polynomial folds back before it gets there (so that a wide corner is an honest hole rather
-    /// than a ghost).
+    /// Maps distorted normalised coordinates to undistorted ones; `None` where no ray in front of the camera maps there
+    /// or the polynomial folds back before it (so that a wide corner is a hole rather than a ghost).
     pub fn undistort(&self, distorted: [f64; 2]) -> Option<[f64; 2]> {
         match *self {
             Self::None => Some(distorted),
@@ -77,8 +76,8 @@ impl Distortion {
         }
     }
 
-    /// Newton's method in two dimensions from the distorted point, in steps along the ray from the centre so
-    /// that it stays on the branch that holds the image centre.
+    /// Newton's method in two dimensions from the distorted point, in steps along the ray from the centre so that it
+    /// stays on the branch of the image centre.
     fn undistort_newton(&self, target: [f64; 2]) -> Option<[f64; 2]> {
         const CONTINUATION_STEPS: usize = 8;
         let mut guess = [0.0, 0.0];
@@ -103,7 +102,7 @@ impl Distortion {
         let mut jacobian = self.jacobian(p);
         'newton: for _ in 0..MAX_ITERATIONS {
             let det = determinant(&jacobian);
-            // A determinant that is not positive means that the image has folded over.
+            // The image is folded where the determinant is not positive.
             if det.is_nan() || det <= MIN_DETERMINANT {
                 return None;
             }
@@ -127,12 +126,12 @@ impl Distortion {
                 }
                 length *= 0.5;
             }
-            break; // no step helps: as near as rounding allows, or stuck at a fold
+            break; // no step improves: the limit of rounding, or a fold
         }
         (error[0].hypot(error[1]) < 1e-9).then_some(p)
     }
 
-    /// Whether the model keeps its sense here: a ray a little farther out maps a little farther out.
+    /// Whether the model preserves orientation here: a ray slightly farther out maps slightly farther out.
     pub(super) fn is_unfolded_at(&self, p: [f64; 2]) -> bool {
         match *self {
             Self::None => true,
@@ -145,8 +144,8 @@ impl Distortion {
         }
     }
 
-    /// d distorted / d undistorted, rows (x, y), by central differences: the models are smooth and this runs
-    /// on load only.
+    /// d distorted / d undistorted, rows (x, y), by central differences: the models are smooth, and this runs only on
+    /// load.
     fn jacobian(&self, [x, y]: [f64; 2]) -> [[f64; 2]; 2] {
         let h = 1e-6 * (1.0 + x.abs().max(y.abs()));
         let (xp, xm) = (self.distort([x + h, y]), self.distort([x - h, y]));
@@ -173,7 +172,7 @@ fn fisheye_angle(k: &[f64; 4], theta: f64) -> f64 {
     theta * (1.0 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))))
 }
 
-/// theta in (0, pi/2) with `fisheye_angle(theta) = target` on the first monotone stretch, or `None`.
+/// The theta in (0, pi/2) with `fisheye_angle(theta) = target` on the first monotone interval, or `None`.
 fn solve_fisheye(k: &[f64; 4], target: f64) -> Option<f64> {
     const SCAN: usize = 256;
     let mut below = 0.0;

@@ -1,11 +1,11 @@
-//! One error type. Every message says which argument (or file and field), what was found, what is allowed.
+//! The error type. Every message names the argument (or file and field), what was found and what is allowed.
 
 use std::path::{Path, PathBuf};
 
 /// Result with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Why a call did not do what it was asked. Nothing the caller owns was changed.
+/// The reason why a call failed. Nothing that the caller owns was changed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -14,19 +14,19 @@ pub enum Error {
     Argument {
         /// The argument, with its index where it is a list: `views[2].mask`.
         argument: String,
-        /// What was found there.
+        /// The value found there.
         found: String,
-        /// What would have been accepted.
+        /// The accepted values.
         allowed: String,
     },
-    /// A file's content is not what its format promises.
+    /// A file's content does not conform to its format.
     #[error("{}: {field}: {reason}", path.display())]
     Format {
         /// The file.
         path: PathBuf,
         /// The field, record or key in it.
         field: String,
-        /// What is wrong with it, and what is expected.
+        /// The defect, and what is expected.
         reason: String,
     },
     /// The operating system refused a file operation.
@@ -34,51 +34,51 @@ pub enum Error {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// The system's own words.
+        /// The system's error.
         source: std::io::Error,
     },
     /// The input is well formed, but this method cannot make a vehicle of it.
     #[error("{stage}: {reason}")]
     Reconstruction {
-        /// The stage that gave up.
+        /// The stage that failed.
         stage: &'static str,
-        /// Why, and what would help.
+        /// The reason, and what would help.
         reason: String,
     },
-    /// What was asked for exists, but this build of the library was made without it.
+    /// The requested feature exists, but this build of the library does not contain it.
     #[error("{argument}: {found} is not in this build; {remedy}")]
     NotBuilt {
-        /// The argument that asked for it.
+        /// The argument that requested it.
         argument: String,
-        /// What was asked for.
+        /// The requested feature.
         found: String,
-        /// How to get it, or what to ask for instead.
+        /// How to get it, or what to use instead.
         remedy: String,
     },
-    /// What was asked for needs something that this machine does not have, or has in a version that cannot be used.
+    /// The request needs something that this machine lacks or has only in an unusable version.
     #[error("{what}: {found}; {remedy}")]
     Missing {
-        /// What is needed.
+        /// The missing component.
         what: &'static str,
-        /// What was found instead, and where.
+        /// The state found instead, and where.
         found: String,
-        /// What to install, and where to say so.
+        /// The component to install, and where to configure it.
         remedy: String,
     },
-    /// The operating system did not start the threads that were asked for.
+    /// The operating system did not start all of the requested threads.
     #[error(
         "threads: {started} of {count} could be started: {found}; raise the system's limit of threads (ulimit -u), or \
          ask for 1, which starts none"
     )]
     Threads {
-        /// How many were asked for.
+        /// The number of requested threads.
         count: usize,
-        /// How many were started, and ended again.
+        /// The number of threads that started, and have ended again.
         started: usize,
-        /// The system's own words.
+        /// The system's error text.
         found: String,
     },
-    /// The progress callback asked to stop.
+    /// The progress callback requested a stop.
     #[error("cancelled during {stage}")]
     Cancelled {
         /// The stage that was running.

@@ -1,4 +1,4 @@
-//! Conversions at the edge of the program: other software's poses into `vehicle_from_camera`, nowhere else.
+//! Conversions of other software's poses to and from this library's conventions, all in this one place.
 
 use super::pose::Pose;
 use crate::error::{Error, Result};
@@ -8,26 +8,27 @@ use glam::{DMat3, DVec3};
 const OPENCV_FROM_OPENGL: DMat3 =
     DMat3::from_cols(DVec3::new(1.0, 0.0, 0.0), DVec3::new(0.0, -1.0, 0.0), DVec3::new(0.0, 0.0, -1.0));
 
-/// A nerfstudio / OpenGL camera-to-world matrix, row-major `[R | t]`, as `world_from_camera` with our camera axes.
+/// Converts a nerfstudio / OpenGL camera-to-world matrix, row-major `[R | t]`, to `world_from_camera` with our camera
+/// axes.
 pub fn pose_from_opengl(argument: &str, camera_to_world: &[f64; 12]) -> Result<Pose> {
     let pose = Pose::from_row_major(argument, camera_to_world)?;
     // `OPENCV_FROM_OPENGL` is its own inverse.
     Ok(Pose { rotation: pose.rotation * OPENCV_FROM_OPENGL, translation: pose.translation })
 }
 
-/// Our `world_from_camera` as a nerfstudio / OpenGL camera-to-world matrix, row-major `[R | t]`.
+/// Converts our `world_from_camera` to a nerfstudio / OpenGL camera-to-world matrix, row-major `[R | t]`.
 pub fn opengl_from_pose(world_from_camera: &Pose) -> [f64; 12] {
     let rotation = world_from_camera.rotation * OPENCV_FROM_OPENGL;
     Pose { rotation, translation: world_from_camera.translation }.to_row_major()
 }
 
-/// COLMAP's world-to-camera quaternion (w, x, y, z) and translation as `world_from_camera`.
+/// Converts COLMAP's world-to-camera quaternion (w, x, y, z) and translation to `world_from_camera`.
 pub fn pose_from_colmap(argument: &str, qvec_wxyz: [f64; 4], tvec: [f64; 3]) -> Result<Pose> {
     Ok(Pose::from_wxyz(argument, qvec_wxyz, DVec3::from_array(tvec))?.inverse())
 }
 
-/// OpenCV's world-to-camera `rvec`, a rotation vector whose length is the angle in radians, and `tvec`, as
-/// `world_from_camera`: what `cv::solvePnP`, `cv::calibrateCamera` and ArUco return.
+/// Converts the world-to-camera `rvec` (a rotation vector whose length is the angle in radians) and `tvec` that
+/// `cv::solvePnP`, `cv::calibrateCamera` and ArUco return to `world_from_camera`.
 pub fn pose_from_opencv(argument: &str, rvec: [f64; 3], tvec: [f64; 3]) -> Result<Pose> {
     let (rvec, translation) = (DVec3::from_array(rvec), DVec3::from_array(tvec));
     let angle = rvec.length();
@@ -35,18 +36,18 @@ pub fn pose_from_opencv(argument: &str, rvec: [f64; 3], tvec: [f64; 3]) -> Resul
         let found = format!("rvec {rvec}, tvec {translation}");
         return Err(Error::argument(argument, found, "finite numbers"));
     }
-    // The axis of no rotation is any; where the length underflows there is none to tell.
+    // Without a rotation any axis is right, also where the length underflows to zero.
     let axis = if angle > 0.0 { rvec / angle } else { DVec3::Z };
     let rotation = DMat3::from_axis_angle(axis.normalize(), angle);
     Ok(Pose { rotation, translation }.inverse())
 }
 
-/// `vehicle_from_camera` of a vehicle that was tracked as a box: where the box and the camera stood in one frame (ego,
-/// map, UTM) at the moment of the picture. The box's axes must be the vehicle's: x forward, y left, z up.
+/// `vehicle_from_camera` of a vehicle that was tracked as a box, from the poses of the box and the camera in one frame
+/// (ego, map, UTM) at the time of the picture. The box's axes must be the vehicle's: x forward, y left, z up.
 ///
-/// The positions are subtracted before anything is turned. The difference of neighbours is exact, so that what is lost
-/// is what the inputs had lost when they were rounded: at 4e6 m a step of f64 is 0.5 nm (0.9 nm from 2^22 m on), each of
-/// the two is off by half of one, and the result is within 1 nm. Turning first loses three times as much.
+/// The positions are subtracted before the rotation. The difference of nearby positions is exact, so the only error is
+/// the rounding of the inputs: at 4e6 m a step of f64 is 0.5 nm (0.9 nm from 2^22 m on), each of the two is off by half
+/// of one, and the result is within 1 nm. Rotating first loses three times as much.
 pub fn pose_from_box(ego_from_vehicle: &Pose, ego_from_camera: &Pose) -> Pose {
     let vehicle_from_ego = ego_from_vehicle.rotation.transpose();
     Pose {
@@ -92,7 +93,7 @@ mod tests {
         let found = pose_from_box(&vehicle, &camera);
         let expected = vehicle.inverse().after(&camera);
         let rows = |p: &Pose| p.to_row_major();
-        // Translations are about 10: a few steps of 1.8e-15.
+        // Translations are about 10, so rounding is a few steps of 1.8e-15.
         assert!(rows(&found).iter().zip(rows(&expected)).all(|(a, b)| (a - b).abs() < 1e-14));
         let point = DVec3::new(0.4, -0.3, 7.0);
         let in_ego = vehicle.transform_point(found.transform_point(point));

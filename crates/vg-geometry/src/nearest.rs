@@ -1,22 +1,22 @@
 //! Nearest neighbours among points: a k-d tree that is built once.
 //!
-//! Of equally near points the one with the lower index comes first, whatever the machine and the number of threads. A
-//! general crate was measured beside it (kiddo 5.3 and 6.3, 40,000 points on a surface): 1.2 times as fast for one
-//! neighbour, no faster for four, but in which order ties come out depends on the instruction set, and it brings a
-//! dozen crates that nothing else here needs.
+//! Equally near points are ordered by index, whatever the machine and the number of threads. A general crate was
+//! measured for comparison (kiddo 5.3 and 6.3, 40,000 points on a surface): it is 1.2 times as fast for one neighbour
+//! and no faster for four, but its order of ties depends on the instruction set, and it adds a dozen dependencies.
 
 use glam::DVec3;
 
-/// As many points or fewer are looked at one by one.
+/// Largest number of points that are searched one by one.
 const LEAF: usize = 16;
 
-/// Halves larger than this are built side by side.
+/// Halves larger than this are built in parallel.
 const ALONE: usize = 4096;
 
-/// Points to be found again.
+/// A k-d tree over points.
 #[derive(Clone, Debug)]
 pub struct Nearest {
-    /// The middle one parts those before it from those behind it along an axis, which alternates; halves likewise.
+    /// The middle point separates those before it from those after it along an axis, which alternates; each half is
+    /// ordered in the same way.
     tree: Vec<Point>,
 }
 
@@ -26,23 +26,23 @@ struct Point {
     index: u32,
 }
 
-/// A point that was found.
+/// A neighbour found by a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Neighbor {
-    /// Among the points that the tree was made of.
+    /// Index in the list of points that the tree was built from.
     pub index: usize,
-    /// In the points' unit, squared.
+    /// Squared distance, in the points' unit.
     pub squared: f64,
 }
 
-/// Square distance, then index: the order of neighbours.
+/// The sort key of neighbours: squared distance, then index.
 type Rank = (f64, u32);
 
-/// Farther than any point.
+/// The rank after that of any point.
 const NONE: Rank = (f64::INFINITY, u32::MAX);
 
 impl Nearest {
-    /// Of finite points, fewer than 2^32.
+    /// Builds the tree of finite points, fewer than 2^32.
     pub fn new(points: impl IntoIterator<Item = DVec3>) -> Self {
         let point = |(index, at): (usize, DVec3)| {
             debug_assert!(at.is_finite(), "points[{index}] is {at}");
@@ -54,19 +54,19 @@ impl Nearest {
         Self { tree }
     }
 
-    /// The same of positions as pictures and scans have them.
-    pub fn of_f32(points: &[[f32; 3]]) -> Self {
+    /// Builds the tree of f32 positions, as point clouds and scans store them.
+    pub fn from_f32(points: &[[f32; 3]]) -> Self {
         Self::new(points.iter().map(|p| DVec3::from_array(p.map(f64::from))))
     }
 
-    /// The point nearest to a finite place; `None` of no points.
+    /// The point nearest to a finite position; `None` for an empty tree.
     pub fn nearest(&self, to: DVec3) -> Option<Neighbor> {
         let mut best = [NONE];
         search(&self.tree, 0, to.to_array(), &mut best);
         (best[0] != NONE).then(|| found(best[0]))
     }
 
-    /// The `k` points nearest to a finite place, nearest first; all of them where there are fewer.
+    /// The `k` points nearest to a finite position, nearest first; all of them where there are fewer.
     pub fn k_nearest(&self, to: DVec3, k: usize) -> Vec<Neighbor> {
         let mut best = vec![NONE; k.min(self.tree.len())];
         if !best.is_empty() {
@@ -80,7 +80,7 @@ fn found((squared, index): Rank) -> Neighbor {
     Neighbor { index: index as usize, squared }
 }
 
-/// Sorts into a tree. Equal coordinates are parted by index: any number of them may coincide.
+/// Sorts the points into a tree. Equal coordinates are ordered by index, so any number of points may coincide.
 fn part(points: &mut [Point], axis: usize) {
     if points.len() <= LEAF {
         return;
@@ -98,7 +98,7 @@ fn part(points: &mut [Point], axis: usize) {
     }
 }
 
-/// Sorts points of this part of the tree in among the best, of which there is at least one.
+/// Inserts the points of this part of the tree into `best`, which is not empty.
 fn search(points: &[Point], axis: usize, to: [f64; 3], best: &mut [Rank]) {
     if points.len() <= LEAF {
         points.iter().for_each(|point| offer(point, to, best));
@@ -111,7 +111,7 @@ fn search(points: &[Point], axis: usize, to: [f64; 3], best: &mut [Rank]) {
     let next = (axis + 1) % 3;
     search(near, next, to, best);
     offer(&points[middle], to, best);
-    // As far as the worst of the best may still have a lower index.
+    // `<=`: a point as far away as the worst of the best may have a lower index.
     if offset * offset <= best[best.len() - 1].0 {
         search(far, next, to, best);
     }
@@ -133,7 +133,7 @@ fn offer(point: &Point, to: [f64; 3], best: &mut [Rank]) {
 mod tests {
     use super::*;
 
-    /// Uniform in [0, 1), the same on every machine.
+    /// Uniform numbers in [0, 1), equal on every machine.
     fn uniform(state: &mut u64) -> f64 {
         *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (*state >> 11) as f64 / (1u64 << 53) as f64
@@ -151,9 +151,9 @@ mod tests {
     }
 
     #[test]
-    fn the_tree_finds_what_looking_at_all_finds_in_the_order_of_indices() {
+    fn the_tree_returns_the_neighbours_of_an_exhaustive_search_with_ties_by_index() {
         let mut state = 1;
-        // Cells of a coarse grid (0: none): many points coincide or are equally far.
+        // On a coarse grid of that many cells (0: no grid) many points coincide or are equally far.
         for (n, cells) in [(0, 0.0), (1, 0.0), (3, 0.0), (700, 0.0), (700, 6.0), (9_000, 12.0), (9_000, 0.0)]
         {
             let mut point = || {
@@ -180,7 +180,7 @@ mod tests {
             assert_eq!(indices, (0..20).collect::<Vec<_>>());
             assert_eq!(tree.nearest(point + DVec3::X), Some(Neighbor { index: 0, squared: 1.0 }));
         }
-        // On a line and on a plane: equal along two axes, and along one.
+        // Points equal along two axes (on a line), and along one (on a plane).
         for equal in [2, 1] {
             let mut state = 7;
             let point = |_| {

@@ -1,36 +1,38 @@
-//! Points of the vehicle's frame to pixels and back, through the camera's lens.
+//! Projection of points of the vehicle frame to pixels and back, through the camera's lens.
 
 use super::camera::Camera;
 use super::unfolded::Unfolded;
 use glam::DVec3;
 
-/// Largest difference, relative to the radius from the axis, of a ray and what the lens makes of its pixel. Beyond a
-/// fold of the model the two are rays apart; short of it they differ by what [`Camera::ray`] is solved to, 1e-9.
+/// Largest difference, relative to the radius from the axis, between a ray and the one that [`Camera::ray`] returns for
+/// its pixel. Beyond a fold of the model these are different rays; before it they differ by the solver's tolerance,
+/// 1e-9.
 const SAME_RAY: f64 = 1e-6;
 
-/// From so many points on, a table of where the lens folds takes less time than following each pixel back: it costs as
+/// Number of points from which a table of the lens's folds is faster than undistorting each pixel: the table costs as
 /// much as some thousand of them.
 const TABLE_PAYS: usize = 5_000;
 
-/// Radius from the axis, x/z, up to which the table looks where a corner of the picture has no ray: 76 degrees.
+/// Radius from the axis, x/z, up to which the table reaches where a corner of the picture has no ray: 76 degrees.
 const WIDEST_RADIUS: f64 = 4.0;
 
-/// A pixel, and the planar depth of the point that is seen there, metres.
+/// A pixel, and the planar depth of the point seen there, metres.
 pub type PixelAndDepth = ([f64; 2], f64);
 
 impl Camera {
-    /// Column and row of a point, metres, vehicle frame. `None` where the camera has no picture of it: on or behind its
-    /// plane, and beyond the angle at which the lens model folds back, where a pixel would show a ghost.
+    /// Column and row of a point, metres, vehicle frame. `None` where the camera cannot see it: on or behind its plane,
+    /// and beyond the angle at which the lens model folds back, where a pixel would show a ghost.
     pub fn pixel_from_vehicle(&self, point_vehicle: DVec3) -> Option<[f64; 2]> {
         self.pixel_and_depth(point_vehicle).map(|(pixel, _)| pixel)
     }
 
-    /// The same with the point's planar depth, metres along the optical axis.
+    /// The pixel of a point, as [`Camera::pixel_from_vehicle`], and the point's planar depth, metres along the optical
+    /// axis.
     pub fn pixel_and_depth(&self, point_vehicle: DVec3) -> Option<PixelAndDepth> {
         self.pixel_and_depth_by(None, point_vehicle)
     }
 
-    /// The same of many points, in their order; the answers are those for each.
+    /// The result of [`Camera::pixel_and_depth`] for each of many points, in their order.
     pub fn pixels_and_depths(&self, points_vehicle: &[[f64; 3]]) -> Vec<Option<PixelAndDepth>> {
         let has_table = points_vehicle.len() >= TABLE_PAYS && !self.distortion.is_none();
         let table = has_table.then(|| Unfolded::new(&self.distortion, self.corner_radius()));
@@ -38,7 +40,7 @@ impl Camera {
         points_vehicle.iter().map(each).collect()
     }
 
-    /// `table` spares the points that it contains the way back through the lens.
+    /// Points that `table` contains need no undistortion.
     fn pixel_and_depth_by(&self, table: Option<&Unfolded>, point_vehicle: DVec3) -> Option<PixelAndDepth> {
         let point = self.vehicle_from_camera.inverse().transform_point(point_vehicle);
         let pixel = self.project(point).filter(|p| p.iter().all(|v| v.is_finite()))?;
@@ -49,7 +51,7 @@ impl Camera {
         seen.then_some((pixel, point.z))
     }
 
-    /// Largest x/z, y/z of the picture's corners.
+    /// Largest radius (x/z, y/z) of the picture's corners.
     fn corner_radius(&self) -> f64 {
         let (width, height) = (f64::from(self.width), f64::from(self.height));
         let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];
@@ -57,13 +59,13 @@ impl Camera {
         corners.into_iter().map(radius).fold(0.0, f64::max).min(WIDEST_RADIUS)
     }
 
-    /// Whether the lens leads this pixel back to the point it was projected from.
+    /// Whether the ray of this pixel is the one that was projected to it.
     fn is_seen_along(&self, [x, y]: [f64; 2], pixel: [f64; 2]) -> bool {
         self.ray(pixel).is_some_and(|ray| (ray.x - x).hypot(ray.y - y) <= SAME_RAY * (1.0 + x.hypot(y)))
     }
 
-    /// The point at planar depth `depth_m` behind a pixel, metres, vehicle frame. `None` where the lens has no ray to the
-    /// pixel, and where the depth is not above 0, which means no measurement, or not finite.
+    /// Lifts a pixel to the point at planar depth `depth_m`, metres, vehicle frame. `None` where the lens has no ray to
+    /// the pixel, and where the depth is not finite or not above 0, which means no measurement.
     pub fn vehicle_from_pixel(&self, pixel: [f64; 2], depth_m: f64) -> Option<DVec3> {
         if depth_m.is_nan() || depth_m <= 0.0 {
             return None;
@@ -97,7 +99,7 @@ mod tests {
                 let point = DVec3::new((0.7 * t).sin(), (1.3 * t).cos(), 0.5 * (0.3 * t).sin());
                 let (pixel, depth) = camera.pixel_and_depth(point).unwrap();
                 let back = camera.vehicle_from_pixel(pixel, depth).unwrap();
-                // Rays are solved to 1e-9 at worst, distances are about 6.
+                // Rays are accurate to 1e-9, distances are about 6.
                 assert!((back - point).length() < 1e-8, "{distortion:?} {point} {back}");
             }
         }
@@ -132,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_behind_or_nowhere_has_no_pixel_and_depths_that_mean_nothing_give_no_point() {
+    fn points_behind_the_camera_or_not_finite_have_no_pixel_and_invalid_depths_give_no_point() {
         let camera = camera(BROWN);
         for point in [DVec3::new(6.0, -8.0, 2.7), camera.center(), DVec3::NAN, DVec3::INFINITY] {
             assert_eq!(camera.pixel_from_vehicle(point), None, "{point}");

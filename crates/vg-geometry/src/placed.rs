@@ -1,25 +1,25 @@
-//! Cameras that are placed by hand: one that looks at a point, and a circle of them around a box.
+//! Camera placement: one camera that looks at a point, and a circle of cameras around a box.
 
 use super::camera::{Camera, Intrinsics};
 use super::pose::Pose;
 use crate::error::{Error, Result};
 use glam::{DMat3, DVec3};
 
-/// Least sine of the angle between the line of sight and `up`: below it, rounding decides which way is up.
+/// Smallest sine of the angle between the line of sight and `up`; below it, rounding decides which way is up.
 const LEAST_TILT: f64 = 1e-6;
 
-/// Smallest cylinder that a turntable walks around, metres: a single Gaussian has no extent.
+/// Smallest radius and half height of the cylinder that a turntable circles, metres: a single Gaussian has no extent.
 const LEAST_RADIUS_M: f64 = 1e-3;
 
-/// Share of the distance at which all centres just fit: what Gaussians reach beyond their centres is in the picture too.
+/// Factor on the distance at which all centres just fit, because Gaussians extend beyond their centres.
 const MARGIN: f64 = 1.02;
 
-/// Most cameras of one turntable.
+/// Maximum number of cameras of one turntable.
 const MOST_CAMERAS: usize = 100_000;
 
 impl Pose {
-    /// `vehicle_from_camera` of a camera at `eye` whose optical axis meets `target`. The picture's columns run upwards
-    /// along `up` as far as the line of sight allows; [`DVec3::Z`] for a camera that is held level.
+    /// `vehicle_from_camera` of a camera at `eye` whose optical axis meets `target`. The picture's upward direction is
+    /// `up`, as far as the line of sight allows; use [`DVec3::Z`] for a level camera.
     ///
     /// # Errors
     /// `argument` and one of `eye`, `target`, `up`: a number is not finite, `eye` is `target`, `up` is zero or lies
@@ -49,15 +49,15 @@ impl Pose {
     }
 }
 
-/// The unit vector along `v`; `None` for zero and for what overflows.
+/// The unit vector along `v`; `None` for zero and on overflow.
 fn direction(v: DVec3) -> Option<DVec3> {
-    // By the largest entry first, so that lengths of 1e-200 and 1e200 neither vanish nor overflow.
+    // Divide by the largest entry first, so that lengths of 1e-200 and 1e200 neither vanish nor overflow.
     (v / v.abs().max_element()).try_normalize()
 }
 
 impl Intrinsics {
-    /// A pinhole whose picture shows `fov_y_degrees` from its top to its bottom row, with square pixels and the
-    /// principal point in the middle.
+    /// Intrinsics of a pinhole with vertical field of view `fov_y_degrees`, square pixels and the principal point in
+    /// the middle.
     ///
     /// # Errors
     /// `fov_y_degrees` is not between 0 and 180, both excluded.
@@ -74,10 +74,10 @@ impl Intrinsics {
 
 impl Camera {
     /// A pinhole camera at `eye` that looks at `target`, metres, vehicle frame: [`Pose::look_at`] with
-    /// [`Intrinsics::from_fov`]. For another lens give [`Pose::look_at`] to its constructor.
+    /// [`Intrinsics::from_fov`]. For another lens, pass [`Pose::look_at`] to its constructor.
     ///
     /// # Errors
-    /// What these two and [`Camera::validate`] refuse.
+    /// Those of these two and of [`Camera::validate`].
     pub fn look_at(
         eye: DVec3,
         target: DVec3,
@@ -91,7 +91,7 @@ impl Camera {
     }
 }
 
-/// How a turntable looks.
+/// Parameters of a turntable, a circle of cameras around a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turntable {
     /// Angle by which the cameras look down, -89 to 89 degrees.
@@ -101,7 +101,7 @@ pub struct Turntable {
 }
 
 impl Default for Turntable {
-    /// Slightly from above, through a lens for portraits.
+    /// A view slightly from above, through a portrait lens.
     fn default() -> Self {
         Self { elevation_degrees: 12.0, fov_y_degrees: 35.0 }
     }
@@ -109,12 +109,12 @@ impl Default for Turntable {
 
 impl Turntable {
     /// `count` cameras on a circle around the box from `low` to `high`, metres, vehicle frame: the first in front, the
-    /// next towards the left, each with all of the box in its picture. [`Gaussians::bounds`](crate::Gaussians::bounds)
-    /// gives the box of a model.
+    /// next towards the left, each with the whole box in its picture. [`Gaussians::bounds`](crate::Gaussians::bounds)
+    /// returns the box of a model.
     ///
     /// # Errors
-    /// No camera or more than 100,000, a box without order or with a NaN, angles out of range, and what
-    /// [`Camera::validate`] refuses.
+    /// `count` is 0 or above 100,000, `low` is above `high`, a bound is not finite, an angle is out of range, or
+    /// [`Camera::validate`] rejects a camera.
     pub fn cameras(
         &self,
         low: [f32; 3],
@@ -154,12 +154,12 @@ impl Turntable {
     }
 }
 
-/// Least distance, from its middle, of a camera that has an upright cylinder between the borders of its picture.
-/// `tangents` of half its fields of view, `(sin, cos)` of the angle by which it looks down.
+/// Smallest distance, from the middle of an upright cylinder, of a camera whose picture contains the cylinder.
+/// `tangents` are those of half its fields of view, `(sin, cos)` that of the angle by which it looks down.
 ///
 /// A point of the rims at azimuth a from the line of sight and height z lies r cos(a) cos + z sin nearer to the camera
-/// than the middle, r sin(a) beside the middle and z cos - r cos(a) sin above it. Beside it, the sum of the two is largest
-/// at tan(a) = 1 / (tangent cos); above it, at one of a = 0 and a = pi.
+/// than the middle, r sin(a) to its side and z cos - r cos(a) sin above it. Horizontally, the sum of the two is largest
+/// at tan(a) = 1 / (tangent cos); vertically, at one of a = 0 and a = pi.
 fn fitting_distance(
     radius: f64,
     half_height: f64,
@@ -177,14 +177,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_target_is_in_the_middle_and_what_lies_above_it_is_higher_in_the_picture() {
+    fn the_target_is_in_the_middle_and_a_point_above_it_is_higher_in_the_picture() {
         let (eye, target) = (DVec3::new(3.0, -4.0, 1.5), DVec3::new(0.2, 0.1, -0.3));
         for up in [DVec3::Z, 1e200 * DVec3::Z, 1e-200 * DVec3::Z] {
             let camera = Camera::look_at(eye, target, up, 40.0, 640, 480).unwrap();
             assert_eq!(camera.center(), eye);
             let pixel = |point| camera.pixel_from_vehicle(point).unwrap();
             let [u, v] = pixel(target);
-            // Pixels are some 1e3, their steps 1e-13.
+            // Pixel coordinates are up to 1e3, with steps of 1e-13.
             assert!((u - 320.0).abs() < 1e-10 && (v - 240.0).abs() < 1e-10, "{u} {v}");
             let above = pixel(target + 0.1 * DVec3::Z);
             assert!((above[0] - 320.0).abs() < 1e-10 && above[1] < 235.0, "{above:?}");
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn views_without_a_direction_are_refused_by_the_argument_that_makes_them_so() {
+    fn views_without_a_direction_are_refused_by_argument() {
         let look = |eye, target, up, fov| Camera::look_at(eye, target, up, fov, 64, 48);
         let (o, x, z) = (DVec3::ZERO, DVec3::X, DVec3::Z);
         for (camera, beginning) in [
@@ -231,7 +231,7 @@ mod tests {
             let cameras = table.cameras(low, high, 7, width, height).unwrap();
             assert_eq!(cameras.len(), 7);
             let (first, second) = (cameras[0].center(), cameras[1].center());
-            // The box's middle is (-0.2, -0.05, 0.1), of f32.
+            // The box's middle is (-0.2, -0.05, 0.1), rounded to f32.
             assert!(first.x > 0.0 && (first.y + 0.05).abs() < 1e-6 && second.y > 0.1, "{first} {second}");
             for camera in &cameras {
                 for corner in 0..8 {
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn turntables_that_cannot_be_are_refused() {
+    fn invalid_turntables_are_refused() {
         let cameras = |table: Turntable, low, count| table.cameras(low, [1.0; 3], count, 64, 48);
         let (usual, low) = (Turntable::default(), [-1.0; 3]);
         for (made, beginning) in [

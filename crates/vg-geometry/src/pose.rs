@@ -19,7 +19,7 @@ impl Pose {
     /// The transform that changes nothing.
     pub const IDENTITY: Self = Self { rotation: DMat3::IDENTITY, translation: DVec3::ZERO };
 
-    /// From a matrix that is a rotation up to noise of [`MAX_ORTHONORMALITY_ERROR`], which is removed
+    /// Makes a pose from a matrix that is a rotation up to noise of [`MAX_ORTHONORMALITY_ERROR`], which is removed
     /// (nearest rotation). Reflections, scales and non-finite numbers are errors that name `argument`.
     pub fn new(argument: &str, rotation: DMat3, translation: DVec3) -> Result<Self> {
         if !rotation.is_finite() || !translation.is_finite() {
@@ -46,7 +46,7 @@ impl Pose {
         Self::new(argument, rotation, DVec3::new(m[3], m[7], m[11]))
     }
 
-    /// From a quaternion (w, x, y, z) of any non-zero finite norm.
+    /// Makes a pose from a quaternion (w, x, y, z) of any non-zero finite norm.
     pub fn from_wxyz(argument: &str, wxyz: [f64; 4], translation: DVec3) -> Result<Self> {
         // Divide by the largest entry first, so that norms of 1e-200 and 1e200 neither vanish nor overflow.
         let largest = wxyz.iter().fold(0.0f64, |m, x| m.max(x.abs()));
@@ -62,20 +62,20 @@ impl Pose {
         Ok(Self { rotation, translation })
     }
 
-    /// Row-major `[R | t]`.
+    /// The row-major matrix `[R | t]`.
     pub fn to_row_major(&self) -> [f64; 12] {
         let r = self.rotation.transpose().to_cols_array();
         let t = self.translation;
         [r[0], r[1], r[2], t.x, r[3], r[4], r[5], t.y, r[6], r[7], r[8], t.z]
     }
 
-    /// `from_to` of this `to_from`.
+    /// The inverse transform: `from_to` of this `to_from`.
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.transpose();
         Self { rotation, translation: -(rotation * self.translation) }
     }
 
-    /// A point, metres.
+    /// Maps a point, metres.
     pub fn transform_point(&self, p: DVec3) -> DVec3 {
         self.rotation * p + self.translation
     }

@@ -1,4 +1,4 @@
-//! How work runs: on threads that the caller started, with a progress callback that may cancel.
+//! Progress reports and cancellation of work that runs on the caller's worker threads.
 
 mod course;
 mod watch;
@@ -12,23 +12,23 @@ pub use crate::threads::Threads;
 use std::cell::RefCell;
 use std::ops::ControlFlow;
 
-/// Where a run stands.
+/// The progress of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
     /// Name of the running stage, as in the report.
     pub stage: &'static str,
-    /// Part of the stage that is done, 0 to 1.
+    /// Completed fraction of the stage, 0 to 1.
     pub fraction: f64,
-    /// Part of the whole call that is done, in expected time: it never falls, and is 1 in the last call.
+    /// Completed fraction of the whole call, in expected time. It never decreases, and is 1 in the last call.
     pub overall: f64,
-    /// What an optimisation has come down to, where the stage is one.
+    /// The current loss, where the stage is an optimisation.
     pub loss: Option<f64>,
 }
 
-/// Called on the caller's own thread at every stage boundary, inside the long ones, and at the end; `Break` cancels.
+/// Called on the caller's own thread at every stage boundary, inside long stages, and at the end; `Break` cancels.
 pub type ProgressCallback<'a> = dyn FnMut(Progress) -> ControlFlow<()> + 'a;
 
-/// What every stage is given: worker threads and the progress callback.
+/// The context of every stage: worker threads and the progress callback.
 pub struct Context<'a> {
     threads: &'a Threads,
     callback: RefCell<&'a mut ProgressCallback<'a>>,
@@ -36,12 +36,12 @@ pub struct Context<'a> {
 }
 
 impl<'a> Context<'a> {
-    /// For one run on these threads.
+    /// Context of one run on these threads.
     pub fn new(threads: &'a Threads, callback: &'a mut ProgressCallback<'a>) -> Self {
         Self { threads, callback: RefCell::new(callback), course: RefCell::default() }
     }
 
-    /// How many worker threads.
+    /// The number of worker threads.
     pub fn threads(&self) -> usize {
         self.threads.count()
     }
@@ -51,30 +51,30 @@ impl<'a> Context<'a> {
         self.threads.run(work)
     }
 
-    /// What is to come, for the overall fraction of what is told from now on.
+    /// Sets the expected stages, from which the overall fraction of all further reports is computed.
     pub fn follow(&self, course: Course) {
         self.course.replace(course);
     }
 
-    /// Tells the caller where the run stands; an error if the caller wants it to stop.
+    /// Reports progress to the caller; [`Error::Cancelled`] if the callback returns `Break`.
     pub fn report(&self, stage: &'static str, fraction: f64) -> Result<()> {
         let overall = self.course.borrow_mut().overall(stage, fraction);
-        self.tell(Progress { stage, fraction, overall, loss: None })
+        self.call(Progress { stage, fraction, overall, loss: None })
     }
 
-    /// The same of an optimisation.
+    /// Reports progress and the current loss of an optimisation; see [`Context::report`].
     pub fn report_loss(&self, stage: &'static str, fraction: f64, loss: f64) -> Result<()> {
         let overall = self.course.borrow_mut().overall(stage, fraction);
-        self.tell(Progress { stage, fraction, overall, loss: Some(loss) })
+        self.call(Progress { stage, fraction, overall, loss: Some(loss) })
     }
 
-    /// Tells the caller that all is done, in the stage that was told last.
+    /// Reports the end of the run, in the stage of the last report.
     pub fn report_end(&self) -> Result<()> {
         let stage = self.course.borrow().stage();
-        self.tell(Progress { stage, fraction: 1.0, overall: 1.0, loss: None })
+        self.call(Progress { stage, fraction: 1.0, overall: 1.0, loss: None })
     }
 
-    fn tell(&self, progress: Progress) -> Result<()> {
+    fn call(&self, progress: Progress) -> Result<()> {
         let stage = progress.stage;
         match (*self.callback.borrow_mut())(progress) {
             ControlFlow::Continue(()) => Ok(()),

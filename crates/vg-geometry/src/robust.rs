@@ -1,34 +1,35 @@
-//! The similarity between two lists of points of which some are wrong: the least median of residuals over triples
-//! (Rousseeuw 1984), then least squares on the points that agree with it.
+//! Robust similarity between two lists of points with outliers: the least median of residuals over triples (Rousseeuw
+//! 1984), then least squares on the inliers.
 
 use super::align::Similarity;
 use crate::error::Result;
 use glam::DVec3;
 
-/// With fewer pairs, three of them can agree by chance with anything: all are used.
+/// Smallest number of pairs of which any are rejected; with fewer, three may agree by chance, so all are used.
 pub const FEWEST_TO_REJECT: usize = 6;
 
-/// A pair is kept if its residual is at most this many medians of all residuals: 4.6 standard deviations of an axis
-/// for normal errors, so that good pairs stay, one in ten thousand aside.
+/// Largest residual of a kept pair, in medians of all residuals. For normal errors this is 4.6 standard deviations of
+/// an axis, so one good pair in ten thousand is rejected.
 pub const KEPT_MEDIANS: f64 = 3.0;
 
-/// Triples tried; all of them where there are fewer. Of pairs half of which are wrong, one triple in eight is right.
+/// Number of triples tried; all of them where there are fewer. With half of the pairs wrong, one triple in eight is
+/// right.
 const TRIALS: usize = 1000;
 
-/// Rounds of fitting and choosing anew.
+/// Maximum number of rounds of fitting and selecting inliers.
 const ROUNDS: usize = 20;
 
-/// Residuals below this part of the targets' extent are rounding.
+/// Residuals below this fraction of the targets' extent are rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// A similarity, and what it was fitted to.
+/// A similarity, with the residuals and inliers of its fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobustFit {
     /// The least-squares similarity of the pairs kept.
     pub similarity: Similarity,
-    /// How far each point ends from its target.
+    /// Distance of each mapped point from its target.
     pub residuals: Vec<f64>,
-    /// Whether a pair agrees with the others and was used.
+    /// Whether each pair was kept as an inlier.
     pub kept: Vec<bool>,
 }
 
@@ -41,8 +42,8 @@ impl RobustFit {
         (squares / kept.len().max(1) as f64).sqrt()
     }
 
-    /// The share of the pairs that were kept, of those beyond the three that any similarity fits: 0 for three pairs,
-    /// which contradict nothing.
+    /// The fraction of pairs kept, not counting the three that a similarity can always fit: 0 for three pairs, which
+    /// leave nothing to check.
     pub fn confidence(&self) -> f64 {
         let spare = |n: usize| n.saturating_sub(3) as f64;
         spare(self.kept.iter().filter(|kept| **kept).count()) / spare(self.kept.len()).max(1.0)
@@ -52,8 +53,8 @@ impl RobustFit {
 impl Similarity {
     /// The similarity that takes `from[i]` to `to[i]` for more than half of the pairs. Deterministic.
     ///
-    /// A pair is left out if its residual is above [`KEPT_MEDIANS`] medians of all residuals; of fewer than
-    /// [`FEWEST_TO_REJECT`] pairs none is.
+    /// A pair is left out if its residual is above [`KEPT_MEDIANS`] medians of all residuals, and never with fewer than
+    /// [`FEWEST_TO_REJECT`] pairs.
     ///
     /// # Errors
     /// As [`Similarity::umeyama`]; also where the pairs that agree are on one line.
@@ -63,11 +64,11 @@ impl Similarity {
             let residuals = residuals(&all, from, to);
             return Ok(RobustFit { similarity: all, residuals, kept: vec![true; from.len()] });
         }
-        let of = |indices: &[usize]| {
+        let fit = |indices: &[usize]| {
             let pick = |points: &[DVec3]| indices.iter().map(|&i| points[i]).collect::<Vec<_>>();
             Self::umeyama(&pick(from), &pick(to))
         };
-        let candidates = triples(from.len()).into_iter().filter_map(|t| of(&t).ok()).chain([all]);
+        let candidates = triples(from.len()).into_iter().filter_map(|t| fit(&t).ok()).chain([all]);
         let by_median = candidates.map(|s| (median(&residuals(&s, from, to)), s));
         let mut similarity = by_median.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(all, |best| best.1);
         let floor = ROUNDING * extent(to);
@@ -79,7 +80,7 @@ impl Similarity {
             if agree == kept {
                 break;
             }
-            similarity = of(&agree)?;
+            similarity = fit(&agree)?;
             kept = agree;
         }
         let residuals = residuals(&similarity, from, to);
@@ -98,7 +99,7 @@ fn extent(points: &[DVec3]) -> f64 {
     (high - low).length()
 }
 
-/// The upper one of the two middle values: more than half are at most this.
+/// The upper median: more than half of the values are at most this.
 fn median(values: &[f64]) -> f64 {
     let mut values = values.to_vec();
     let middle = values.len() / 2;
@@ -114,7 +115,7 @@ fn triples(n: usize) -> Vec<[usize; 3]> {
     (0..TRIALS).map(|t| [pick(3 * t), pick(3 * t + 1), pick(3 * t + 2)]).collect()
 }
 
-/// The same numbers on every machine (splitmix64).
+/// The `i`th pseudorandom number (splitmix64), equal on every machine.
 pub fn scramble(i: u64) -> u64 {
     let z = i.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -127,7 +128,7 @@ mod tests {
     use super::*;
     use glam::DMat3;
 
-    /// Points, where a similarity takes them with noise of `noise`, and the similarity.
+    /// Points, their images under a similarity with added `noise`, and the similarity.
     fn pairs(n: u64, noise: f64) -> (Vec<DVec3>, Vec<DVec3>, Similarity) {
         let number = |i: u64| (scramble(i) >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
         let vector = |i: u64| DVec3::new(number(3 * i), number(3 * i + 1), number(3 * i + 2));
@@ -143,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn four_wrong_points_of_ten_are_named_and_do_no_harm() {
+    fn four_wrong_points_of_ten_are_rejected_and_do_not_change_the_fit() {
         let (from, mut to, truth) = pairs(10, 0.02);
         let wrong = [1, 4, 5, 9];
         wrong.iter().for_each(|&i| to[i] += DVec3::new(2.0, -1.0, i as f64));

@@ -1,7 +1,7 @@
-//! How far from the axis a lens model may be used before its polynomial folds back.
+//! The radius up to which a lens model can be used before its polynomial folds back.
 //!
-//! Beyond the fold two rays share a pixel and the farther one is a ghost. Asking [`Distortion::undistort`] whether it
-//! returns to where one came from costs a Newton iteration a point; this table costs a look-up.
+//! Beyond the fold two rays share a pixel and the farther one is a ghost. Checking that [`Distortion::undistort`]
+//! returns the original ray costs a Newton iteration per point; this table costs a look-up.
 
 use super::distortion::Distortion;
 
@@ -15,7 +15,7 @@ pub struct Unfolded {
 const DIRECTIONS: usize = 128;
 
 impl Unfolded {
-    /// Looks out to `reach`, in normalised coordinates.
+    /// Builds the table out to `reach`, in normalised coordinates.
     pub(crate) fn new(distortion: &Distortion, reach: f64) -> Self {
         const STEPS: usize = 512;
         let mut radius = [reach; DIRECTIONS];
@@ -32,7 +32,7 @@ impl Unfolded {
         Self { radius }
     }
 
-    /// Whether the way from the axis to this point meets no fold.
+    /// Whether there is no fold between the axis and this point.
     pub(crate) fn contains(&self, [x, y]: [f64; 2]) -> bool {
         let turns = y.atan2(x) / std::f64::consts::TAU * DIRECTIONS as f64;
         let k = turns.floor();
@@ -59,7 +59,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lens_without_a_fold_reaches_as_far_as_asked() {
+    fn the_table_of_a_lens_without_a_fold_extends_to_its_reach() {
         let lens = Distortion::Fisheye { k: [0.0; 4] };
         let unfolded = Unfolded::new(&lens, 10.0);
         assert!(unfolded.contains([-7.0, 7.0]) && !unfolded.contains([8.0, 8.0]));

@@ -448,7 +448,7 @@ fn the_largest_picture_and_its_gradients_are_those_of_its_windows() {
             Ok(())
         };
         let targets = (&mut picture, &mut of_picture, &mut found);
-        renderer.both_ways(&g, &camera, &options(), targets, &mut loss).unwrap();
+        renderer.forward_backward(&g, &camera, &options(), targets, &mut loss).unwrap();
         drop(of_picture);
         let mut expected: Option<Vec<Vec<f64>>> = None;
         for (at, weights) in WINDOWS.into_iter().zip(weights) {

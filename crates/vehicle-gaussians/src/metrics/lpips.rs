@@ -1,4 +1,4 @@
-//! LPIPS (Zhang et al. 2018): how different two pictures look, by the features of a network. Contract "picture
+//! LPIPS (Zhang et al. 2018): perceptual distance of two pictures by the features of a network. Contract "picture
 //! distance", version 1 (docs/ONNX.md).
 
 use super::on_white;
@@ -8,22 +8,22 @@ use vg_scene::View;
 use vg_scene::onnx::{Broken, Input, Model, ModelOptions, Ports};
 use vg_splat::render::Rendered;
 
-/// Pixels; the deepest layers of a smaller picture are empty.
+/// Smallest side of a picture, pixels; the deepest layers of a smaller picture are empty.
 pub const LPIPS_MIN_SIDE: u32 = 64;
 
-/// A network that measures. Clones share the open model; threads take turns.
+/// A network that computes LPIPS. Clones share the open model; threads take turns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lpips {
     model: Model,
     net: String,
-    /// Of the pictures that it takes, where they are fixed.
+    /// Height and width of its pictures, where the model fixes them.
     sides: [Option<usize>; 2],
-    /// Index among the outputs.
+    /// Index of the distance among the outputs.
     distance: usize,
 }
 
 impl Lpips {
-    /// Opens the model in a file.
+    /// Opens a model file.
     ///
     /// # Errors
     /// As [`Model::open`] and [`Lpips::new`].
@@ -31,7 +31,7 @@ impl Lpips {
         Self::new(Model::open(path, options)?)
     }
 
-    /// For a model that keeps the contract; [`Error::Format`] says what breaks it.
+    /// Wraps a model that conforms to the contract; the [`Error::Format`] of another names the violation.
     pub fn new(model: Model) -> Result<Self> {
         let (net, sides, distance) =
             Self::read(model.ports()).map_err(|broken| model.broken(broken.field, broken.reason))?;
@@ -44,7 +44,7 @@ impl Lpips {
             [("vg.prior", "a geometry prior"), ("vg.head", "a Gaussian head"), ("vg.mask", "a segmentation")]
         {
             if let Some(name) = ports.metadata.get(key) {
-                let reason = format!("{name:?}: {what}, no picture distance");
+                let reason = format!("{name:?}: {what}, not a picture distance");
                 return Err(Broken::new(format!("metadata {key}"), reason));
             }
         }
@@ -58,7 +58,7 @@ impl Lpips {
         Ok((net, [a[2], a[3]], distance))
     }
 
-    /// Which network measures: `alex`, `vgg`, `squeeze`. Their numbers do not compare.
+    /// The kind of network: `alex`, `vgg` or `squeeze`. Their distances are not comparable.
     pub fn net(&self) -> &str {
         &self.net
     }
@@ -68,8 +68,7 @@ impl Lpips {
     ///
     /// # Errors
     /// [`Error::Argument`] for a picture that is smaller than [`LPIPS_MIN_SIDE`], not `width * height` pixels, not
-    /// finite, or not of the size that the model is fixed to; [`Error::Format`] where what the network says breaks the
-    /// contract.
+    /// finite, or not of the model's fixed size; [`Error::Format`] where the network's output violates the contract.
     pub fn distance(&self, a: &[[f32; 3]], b: &[[f32; 3]], width: u32, height: u32) -> Result<f64> {
         self.check_size(width, height)?;
         let (w, h) = (width as usize, height as usize);
@@ -82,7 +81,7 @@ impl Lpips {
         Ok(f64::from(distance[0]))
     }
 
-    /// The same, and `None` for a picture that is smaller than [`LPIPS_MIN_SIDE`] and not of the model's fixed size.
+    /// [`Lpips::distance`], or `None` for a picture smaller than [`LPIPS_MIN_SIDE`] where the model fixes no size.
     ///
     /// # Errors
     /// As [`Lpips::distance`].
@@ -97,8 +96,8 @@ impl Lpips {
         if is_small { Ok(None) } else { self.distance(a, b, width, height).map(Some) }
     }
 
-    /// Of a picture drawn on white by the view's camera against its photograph, which its mask puts on white; `None` as
-    /// for [`Lpips::distance_of`].
+    /// The distance of a picture that the view's camera draws on white from the view's photograph, masked on white;
+    /// `None` as for [`Lpips::distance_of`].
     ///
     /// # Errors
     /// As [`Lpips::distance`].
@@ -109,7 +108,7 @@ impl Lpips {
     fn check_size(&self, width: u32, height: u32) -> Result<()> {
         for (name, side, fixed) in [("width", width, self.sides[1]), ("height", height, self.sides[0])] {
             let allowed = match fixed {
-                Some(fixed) if fixed != side as usize => format!("{fixed}, which the model is fixed to"),
+                Some(fixed) if fixed != side as usize => format!("{fixed}, the model's fixed size"),
                 None if side < LPIPS_MIN_SIDE => format!("{LPIPS_MIN_SIDE} or more"),
                 _ => continue,
             };
@@ -119,7 +118,7 @@ impl Lpips {
     }
 }
 
-/// Channel by channel, as networks take pictures.
+/// The picture's channels as planes, the layout of networks.
 fn planes(argument: &str, picture: &[[f32; 3]], pixels: usize) -> Result<Vec<f32>> {
     if picture.len() != pixels {
         let allowed = format!("width * height = {pixels}");

@@ -1,7 +1,7 @@
 //! Error between a render and a photograph: PSNR, SSIM, silhouette IoU (method section 7).
 //!
-//! The photograph is composited on white with its mask, the render is drawn on white with its own alpha; both
-//! are compared over the full frame, unmasked, so what spills over the silhouette costs.
+//! The photograph is composited on white with its mask, the render is drawn on white with its own alpha; both are
+//! compared over the full frame, unmasked, so anything drawn beyond the silhouette counts as error.
 
 mod lpips;
 mod surface;
@@ -24,8 +24,8 @@ pub fn on_white(view: &View) -> Vec<[f32; 3]> {
     view.image.pixels().iter().enumerate().map(pixel).collect()
 }
 
-/// Intersection over union of the rendered silhouette (alpha >= 0.5) and the view's mask, leaving out pixels
-/// of which nothing is known; 1 where both are empty.
+/// Intersection over union of the rendered silhouette (alpha >= 0.5) and the view's mask, without unknown pixels; 1
+/// where both are empty.
 pub fn silhouette_iou(alpha: &[f32], view: &View) -> f64 {
     let [both, drawn, vehicle] = silhouettes(alpha, view);
     share(both, drawn + vehicle - both)
@@ -37,7 +37,7 @@ pub fn mask_covered(alpha: &[f32], view: &View) -> f64 {
     share(both, vehicle)
 }
 
-/// Pixels of both silhouettes, of the rendered one, of the mask.
+/// The numbers of pixels in the intersection, in the rendered silhouette, and in the mask.
 fn silhouettes(alpha: &[f32], view: &View) -> [usize; 3] {
     let mut counts = [0; 3];
     for (i, a) in alpha.iter().enumerate() {
@@ -63,7 +63,7 @@ mod tests {
     use vg_scene::{Mask, RgbImage};
 
     #[test]
-    fn silhouettes_are_compared_where_something_is_known() {
+    fn silhouettes_are_compared_only_at_known_pixels() {
         let i = Intrinsics { fx: 4.0, fy: 4.0, cx: 2.0, cy: 0.5 };
         let mut view = View {
             name: "four in a row".into(),

@@ -1,4 +1,4 @@
-//! All measures of one render against its photograph, and their means over views.
+//! All metrics of one render against its photograph, and their means over views.
 
 use super::{on_white, psnr, psnr_in, silhouette_iou, ssim};
 use serde::Serialize;
@@ -8,26 +8,26 @@ use vg_scene::{Scene, View};
 use vg_splat::Gaussians;
 use vg_splat::render::{CpuRenderer, RenderOptions, Rendered};
 
-/// Error of one render on white, or the means over several; `None` where a measure does not exist.
+/// Errors of one render on white, or the means over several; `None` where a metric is undefined.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ViewErrors {
-    /// Full frame, dB.
+    /// PSNR over the full frame, dB.
     pub psnr_db: f64,
-    /// Full frame; `None` for a picture smaller than the window.
+    /// SSIM over the full frame; `None` for a picture smaller than the window.
     pub ssim: Option<f64>,
-    /// Inside the bounding box of the mask, dB; `None` where the mask is empty.
+    /// PSNR inside the bounding box of the mask, dB; `None` where the mask is empty.
     pub psnr_box_db: Option<f64>,
-    /// Alpha >= 0.5 against the mask.
+    /// Intersection over union of alpha >= 0.5 and the mask.
     pub silhouette_iou: f64,
-    /// Mean absolute difference of depth, metres, where the view has depth and alpha >= 0.5; `None` where
-    /// that is nowhere.
+    /// Mean absolute difference of depth, metres, over pixels where the view has depth and alpha >= 0.5; `None` without
+    /// such pixels.
     pub depth_mae_m: Option<f64>,
-    /// 90th percentile of that difference, metres: how wrong the worst tenth is at least.
+    /// 90th percentile of that difference, metres.
     pub depth_p90_m: Option<f64>,
 }
 
 impl ViewErrors {
-    /// Of a picture drawn by the view's camera on white, with expected depth.
+    /// The errors of a picture drawn by the view's camera on white, with expected depth.
     pub fn of(rendered: &Rendered, view: &View) -> Self {
         let truth = on_white(view);
         let width = rendered.width;
@@ -46,10 +46,10 @@ impl ViewErrors {
         }
     }
 
-    /// Errors of a model in every view of a scene, in their order, drawn by the CPU on white.
+    /// The errors of a model in every view of a scene, in their order, drawn by the CPU on white.
     ///
     /// # Errors
-    /// A scene that is not valid.
+    /// The scene is invalid.
     pub fn of_scene(gaussians: &Gaussians, scene: &Scene, threads: &Threads) -> Result<Vec<Self>> {
         scene.validate()?;
         let renderer = CpuRenderer::new();
@@ -61,7 +61,7 @@ impl ViewErrors {
         threads.run(|| scene.views.iter().map(&mut of).collect())
     }
 
-    /// Means over views, each measure over those that have it; `None` of nothing.
+    /// Means over views, each metric over the views that have it; `None` for no views.
     pub fn mean(errors: &[Self]) -> Option<Self> {
         let of = |get: &dyn Fn(&Self) -> Option<f64>| mean(errors.iter().filter_map(get));
         Some(Self {
@@ -80,7 +80,8 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     (n > 0).then(|| sum / n as f64)
 }
 
-/// Where a silhouette ends is the IoU's affair: both must show the vehicle.
+/// Absolute differences of depth at pixels where both the render and the view show the vehicle; errors of the outline
+/// are left to the IoU.
 fn depth_differences(rendered: &Rendered, view: &View) -> Vec<f64> {
     let Some(truth) = view.depth.as_ref().map(vg_scene::DepthMap::depth) else { return Vec::new() };
     let pixels = truth.iter().zip(&rendered.depth).zip(&rendered.alpha);
@@ -88,7 +89,7 @@ fn depth_differences(rendered: &Rendered, view: &View) -> Vec<f64> {
     both.map(|((truth, drawn), _)| f64::from(truth - drawn).abs()).collect()
 }
 
-/// The smallest value that nine tenths of all do not exceed; `None` of nothing.
+/// The smallest value that nine tenths of all do not exceed; `None` for no values.
 fn percentile_90(mut values: Vec<f64>) -> Option<f64> {
     let rank = (9 * values.len()).div_ceil(10).checked_sub(1)?;
     Some(*values.select_nth_unstable_by(rank, f64::total_cmp).1)
@@ -139,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn means_are_taken_over_the_views_that_have_the_measure() {
+    fn means_are_taken_over_the_views_that_have_the_metric() {
         let with = ViewErrors::of(&drawn(), &view(Some(vec![2.0, 1.0])));
         let without = ViewErrors::of(&drawn(), &view(None));
         let mean = ViewErrors::mean(&[with, without]).unwrap();

@@ -24,7 +24,7 @@ pub(super) fn made(parameters: &Parameters, clones: &[Clone], out: &mut Gaussian
     let n = parameters.len();
     let stride = parameters.stride();
     let ArraysMut { means, rotations, scales, opacities, sh } =
-        out.arrays_of(parameters.sh_degree, n + clones.len());
+        out.resized_arrays_mut(parameters.sh_degree, n + clones.len());
     let (of_means, means) = means.split_at_mut(n);
     let (of_rotations, rotations) = rotations.split_at_mut(n);
     let (of_scales, scales) = scales.split_at_mut(n);

@@ -109,7 +109,7 @@ impl<'a> Work<'a> {
             };
             let camera = &views[view].camera;
             let results = (picture, of_picture, &mut *gradients);
-            renderer.both_ways(gaussians, camera, render, results, &mut of_loss)?;
+            renderer.forward_backward(gaussians, camera, render, results, &mut of_loss)?;
             if *watches {
                 seen.note(gaussians, gradients, camera, clones);
             }

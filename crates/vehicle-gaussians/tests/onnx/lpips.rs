@@ -105,7 +105,7 @@ fn pictures_that_cannot_be_measured_are_named() {
     assert_eq!(said(&any, &a, 63, 64), "width: 63; allowed: 64 or more");
     assert_eq!(said(&any, &a, 80, 10), "height: 10; allowed: 64 or more");
     assert_eq!(said(&any, &a[1..], 80, 64), "a: 5119 pixels; allowed: width * height = 5120");
-    assert_eq!(said(&fixed, &a, 64, 80), "width: 64; allowed: 80, which the model is fixed to");
+    assert_eq!(said(&fixed, &a, 64, 80), "width: 64; allowed: 80, the model's fixed size");
     let mut broken = a.clone();
     broken[7][1] = f32::NAN;
     assert!(said(&any, &broken, 80, 64).starts_with("a[7]: ["));
@@ -125,7 +125,7 @@ fn picture_distances_that_break_the_contract_are_named() {
         (|g| g.set("vg.metric", "ssim"), "metadata vg.metric: \"ssim\"; allowed: lpips"),
         (|g| g.set("vg.range", "-1..1"), "metadata vg.range: \"-1..1\"; allowed: 0..1"),
         (|g| g.metadata.retain(|(k, _)| k != "vg.lpips.net"), "metadata vg.lpips.net: missing"),
-        (|g| g.set("vg.mask", "x"), "metadata vg.mask: \"x\": a segmentation, no picture distance"),
+        (|g| g.set("vg.mask", "x"), "metadata vg.mask: \"x\": a segmentation, not a picture distance"),
         (|g| g.inputs.push(Port::new("c", &[Some(1)])), "input c: unknown; allowed: a, b"),
         (
             |g| g.inputs[0].dimensions[0] = Some(2),

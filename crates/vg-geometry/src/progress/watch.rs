@@ -1,4 +1,4 @@
-//! Long work that its caller watches: it tells how far it is, and can be stopped from the calling thread.
+//! Long work that the caller watches: it reports its progress and can be stopped from the calling thread.
 
 use super::{Progress, ProgressCallback, Threads};
 use crate::error::{Error, Result};
@@ -6,45 +6,45 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::Duration;
 
-/// How often the caller of watched work is asked whether to go on: a person does not notice the delay, and a host with
-/// a global lock is not slowed down by it.
+/// Interval between progress callbacks of watched work: short enough that a person does not notice the delay, long
+/// enough that a host with a global lock is not slowed down.
 pub const ASKED_EVERY: Duration = Duration::from_millis(50);
 
-/// What watched work tells its caller, and asks. Loops look at [`Watch::is_stopped`] and leave out what is left; the
-/// function around them returns the error of [`Watch::check`].
+/// Progress and stop flag that watched work shares with its caller. Loops poll [`Watch::is_stopped`] and skip the rest;
+/// the function around them returns the error of [`Watch::check`].
 #[derive(Debug)]
 pub struct Watch {
     stage: &'static str,
     is_stopped: AtomicBool,
-    /// Bits of the largest fraction that was told; those of numbers from 0 on order like the numbers.
+    /// Bits of the largest fraction reported; the bits of non-negative floats order like the floats.
     fraction: AtomicU64,
 }
 
-/// What work is given that nobody watches: it is never stopped.
+/// The watch of work that is not watched: it never stops.
 pub static UNWATCHED: Watch = Watch::new("");
 
 impl Watch {
-    /// Work that has just begun, by the name that its caller is told.
+    /// Watch of work that has just begun; `stage` is the name reported to the caller.
     pub const fn new(stage: &'static str) -> Self {
         Self { stage, is_stopped: AtomicBool::new(false), fraction: AtomicU64::new(0) }
     }
 
-    /// Asks the work to end, from any thread.
+    /// Requests the work to stop, from any thread.
     pub fn stop(&self) {
         self.is_stopped.store(true, Ordering::Relaxed);
     }
 
-    /// Whether the work is to end.
+    /// Whether a stop was requested.
     pub fn is_stopped(&self) -> bool {
         self.is_stopped.load(Ordering::Relaxed)
     }
 
-    /// [`Error::Cancelled`] where the work is to end.
+    /// Returns [`Error::Cancelled`] if a stop was requested.
     pub fn check(&self) -> Result<()> {
         if self.is_stopped() { Err(Error::Cancelled { stage: self.stage }) } else { Ok(()) }
     }
 
-    /// Tells which part of the work is done, 0 to 1, and checks.
+    /// Reports the completed fraction of the work, 0 to 1, and calls [`Watch::check`].
     pub fn report(&self, fraction: f64) -> Result<()> {
         self.fraction.fetch_max(fraction.clamp(0.0, 1.0).to_bits(), Ordering::Relaxed);
         self.check()
@@ -57,9 +57,9 @@ impl Watch {
 }
 
 impl Threads {
-    /// Runs `work` on these threads, while `callback` is called on the calling one: at the start, about every
+    /// Runs `work` on these threads while `callback` is called on the calling thread: at the start, about every
     /// [`ASKED_EVERY`], and with a fraction of 1 at the end. `Break` ends the call with [`Error::Cancelled`] as soon as
-    /// the work looks at its watch. One thread that is the calling one gets a second for this call.
+    /// the work checks its watch. Where the only thread is the calling one, a second is started for this call.
     pub fn run_watched<T: Send>(
         &self,
         stage: &'static str,
@@ -72,10 +72,10 @@ impl Threads {
             watch.check()?;
         }
         let (running, ended) = mpsc::channel::<()>();
-        let done = self.run_beside(
+        let done = self.run_while_waiting(
             move || {
                 let done = work(watch);
-                // Of work that panics it is dropped as well.
+                // It is dropped as well when the work panics.
                 drop(running);
                 done
             },
@@ -103,35 +103,38 @@ mod tests {
     use std::thread;
 
     #[test]
-    fn watched_work_is_told_of_on_the_calling_thread_and_ends_at_one() {
+    fn watched_work_is_reported_on_the_calling_thread_and_ends_at_one() {
         let threads = Threads::new(2).unwrap();
         let caller = thread::current().id();
-        let mut told = Vec::new();
+        let mut reports = Vec::new();
         let made = threads.run_watched(
             "test",
             &mut |progress| {
                 assert_eq!(thread::current().id(), caller);
-                told.push((progress.stage, progress.fraction, progress.overall));
+                reports.push((progress.stage, progress.fraction, progress.overall));
                 ControlFlow::Continue(())
             },
             |watch| {
                 assert_ne!(thread::current().id(), caller);
                 watch.report(0.5)?;
-                // Never back.
+                // The fraction never decreases.
                 watch.report(0.25)?;
                 thread::sleep(3 * ASKED_EVERY);
                 Ok(7)
             },
         );
         assert_eq!(made.unwrap(), 7);
-        assert_eq!((told[0], told[told.len() - 1]), (("test", 0.0, 0.0), ("test", 1.0, 1.0)));
-        assert!(told.len() >= 3 && told[1..told.len() - 1].iter().all(|t| t.1 == 0.5), "{told:?}");
+        assert_eq!((reports[0], reports[reports.len() - 1]), (("test", 0.0, 0.0), ("test", 1.0, 1.0)));
+        assert!(
+            reports.len() >= 3 && reports[1..reports.len() - 1].iter().all(|r| r.1 == 0.5),
+            "{reports:?}"
+        );
     }
 
     #[test]
     fn a_break_at_any_time_stops_the_work() {
         let threads = Threads::new(1).unwrap();
-        // At the start, while the work goes on, and after it.
+        // Break at the start, while the work runs, and after it.
         for (calls, goes_on) in [(0, true), (1, true), (1, false)] {
             let (mut left, mut rounds) = (calls, 0);
             let ended = threads.run_watched(

@@ -1,7 +1,7 @@
-//! A pool of one whose worker is the calling thread: no thread is started, and rayon inside uses no other.
+//! A pool of one whose worker is the calling thread: no thread is started, and rayon inside it uses no other.
 //!
-//! rayon lets its caller run a worker's loop on any thread. Here that is the calling thread, and the loop has one job
-//! and ends with it. The pool costs a few microseconds.
+//! rayon allows a worker's loop to run on any thread. Here that is the calling thread; the loop runs one job and ends.
+//! The pool costs a few microseconds.
 
 use scoped_tls_hkt::scoped_thread_local;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -22,11 +22,11 @@ pub(super) fn run<T>(work: impl FnOnce() -> T) -> T {
         })
         .build();
     let (Ok(pool), Some(worker)) = (pool, worker) else {
-        unreachable!("nothing that can fail is asked of the system");
+        unreachable!("building this pool makes no system call that can fail");
     };
-    // A job of a pool must own all it has, so it finds the work by the thread that it runs on.
+    // A pool's job must own its data, so it reaches the borrowed work through a thread-local.
     pool.spawn(|| WORK.with(|work| work()));
-    // The worker's loop goes on until the pool is gone and its jobs are done.
+    // The worker's loop runs until the pool is dropped and its jobs are done.
     drop(pool);
 
     let mut work = Some(work);
@@ -56,11 +56,11 @@ mod tests {
             all
         });
         assert!(on.iter().all(|id| *id == caller));
-        assert_eq!(rayon::current_thread_index(), None, "the thread is no worker any more");
+        assert_eq!(rayon::current_thread_index(), None, "the thread is no longer a worker");
     }
 
     #[test]
-    fn a_pool_that_lends_its_worker_is_the_one_that_is_used() {
+    fn a_call_from_a_pools_worker_runs_in_that_pool() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
         assert_eq!(pool.install(|| run(rayon::current_num_threads)), 3);
     }

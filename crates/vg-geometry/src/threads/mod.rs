@@ -1,7 +1,7 @@
-//! Worker threads: started once, used by any number of calls, and gone with their handle.
+//! Worker threads: started once, used by any number of calls, and joined when their handle is dropped.
 //!
-//! All parallel loops of the library run in the rayon pool that they are called from. [`Threads::run`] is the one
-//! place where such a pool comes from: rayon's global pool is never used.
+//! All parallel loops of the library run in the rayon pool that they are called from. Only [`Threads::run`] enters such
+//! a pool; rayon's global pool is never used.
 
 mod calling;
 mod of_process;
@@ -17,32 +17,32 @@ use std::time::Duration;
 pub use of_process::OfProcess;
 pub use signals::blocked as without_signals;
 
-/// Worker threads of the caller's own, started once and used by any number of calls, one after another or at
-/// the same time. They end when this is dropped. One thread is the calling thread itself: none is started.
+/// Worker threads that the caller owns, started once and used by any number of calls, one after another or at the same
+/// time. They end when this is dropped. A count of 1 uses the calling thread itself and starts none.
 #[derive(Debug)]
 pub struct Threads {
     workers: OfProcess<Workers>,
 }
 
-/// Where work is done.
+/// The threads on which work runs.
 #[derive(Debug)]
 enum Workers {
-    /// On the thread that asks for it.
+    /// The calling thread.
     Calling,
-    /// On threads of the pool. The pool is `None` only while it is dropped.
+    /// The threads of a pool. The pool is `None` only while it is dropped.
     Pool { pool: Option<rayon::ThreadPool>, handles: Vec<JoinHandle<()>> },
 }
 
-/// How often a worker looks whether it was answered: much less than an answer takes that is worth asking for.
+/// Interval at which a worker polls for its answer, much shorter than any callback worth making takes.
 const ANSWER_POLL: Duration = Duration::from_micros(20);
 
-/// What the names of worker threads begin with.
+/// Prefix of the names of worker threads.
 pub const THREAD_NAME: &str = "vg-";
 
-/// The most threads of one handle.
+/// Maximum number of threads of one handle.
 pub const MAX_THREADS: usize = 1024;
 
-/// One per core that this process may use: what its affinity and the quotas of its control groups allow.
+/// The number of cores that this process may use, by its affinity and the quotas of its control groups.
 fn one_per_core() -> usize {
     thread::available_parallelism().map_or(1, NonZero::get).min(MAX_THREADS)
 }
@@ -67,7 +67,7 @@ impl Threads {
         Ok(Self { workers: OfProcess::new(workers) })
     }
 
-    /// How many.
+    /// The number of threads.
     ///
     /// # Panics
     /// As [`Threads::run`].
@@ -75,7 +75,7 @@ impl Threads {
         self.pool().map_or(1, rayon::ThreadPool::current_num_threads)
     }
 
-    /// Whether these threads are of this process: a fork has none of its parent's.
+    /// Checks that these threads belong to this process: a fork has none of its parent's threads.
     ///
     /// # Errors
     /// [`Error::Argument`] in a fork of the process that made them.
@@ -83,8 +83,8 @@ impl Threads {
         self.workers.get("threads").map(drop)
     }
 
-    /// Runs `work` on these threads: rayon inside it uses them and no others. On the calling thread where there is one;
-    /// if that is a worker of another rayon pool, `work` runs in that pool.
+    /// Runs `work` on these threads: rayon inside it uses them and no others. A single thread is the calling one; if
+    /// that is a worker of another rayon pool, `work` runs in that pool.
     ///
     /// # Panics
     /// In a fork of the process that made them, see [`Threads::check_process`].
@@ -95,8 +95,9 @@ impl Threads {
         }
     }
 
-    /// Runs `work` on these threads with a function to ask the calling thread, where `answer` runs: for callbacks,
-    /// which belong to the caller's own thread, out of the middle of work. `answer` may use these threads.
+    /// Runs `work` on these threads and hands it a function that calls `answer` on the calling thread and waits for the
+    /// result. It serves callbacks from the middle of work, which must run on the caller's own thread. `answer` may use
+    /// these threads.
     ///
     /// # Panics
     /// As [`Threads::run`].
@@ -123,7 +124,7 @@ impl Threads {
                             Err(TryRecvError::Disconnected) => panic!("no answer: the caller panicked"),
                             Err(TryRecvError::Empty) => {}
                         }
-                        // The others may be busy, and the caller may need a worker for the answer.
+                        // The other workers may be busy, and the caller may need one for the answer.
                         if rayon::yield_now() != Some(rayon::Yield::Executed) {
                             thread::sleep(ANSWER_POLL);
                         }
@@ -132,22 +133,22 @@ impl Threads {
                 *slot = Some(work(&ask_caller));
             });
             for question in asked {
-                // Where it cannot be told, the worker panicked and the scope will say so.
+                // Sending fails only where the worker panicked; the scope then propagates the panic.
                 let _ = tell.send(answer(question));
             }
         });
         done.expect("the scope ends after the work")
     }
 
-    /// Runs `work` on these threads while the calling thread runs `wait`. Where one thread is the calling thread itself, one
-    /// more is started for this call: nobody could wait otherwise.
+    /// Runs `work` on these threads while the calling thread runs `wait`. Where the only thread is the calling one,
+    /// another is started for this call, so that the calling thread is free to wait.
     ///
     /// # Errors
-    /// [`Error::Threads`] where that one cannot be started.
+    /// [`Error::Threads`] where that thread cannot be started.
     ///
     /// # Panics
     /// As [`Threads::run`], and where `work` does.
-    pub(crate) fn run_beside<T: Send>(
+    pub(crate) fn run_while_waiting<T: Send>(
         &self,
         work: impl FnOnce() -> T + Send,
         wait: impl FnOnce(),
@@ -193,7 +194,7 @@ impl Workers {
                 .build()
         });
         let started = handles.len();
-        // Where one thread could not be started, those before it are on their way out.
+        // Where one thread could not be started, the earlier ones are already ending.
         let mut workers = Self::Pool { pool: None, handles };
         let found = pool.map_err(|e| Error::Threads { count, started, found: e.to_string() })?;
         if let Self::Pool { pool, .. } = &mut workers {
@@ -211,12 +212,12 @@ impl Workers {
 }
 
 impl Drop for Workers {
-    /// Waits for the threads to be gone, which rayon alone does not.
+    /// Joins the threads, which rayon does not do.
     fn drop(&mut self) {
         let Self::Pool { pool, handles } = self else { return };
         drop(pool.take());
         for handle in handles.drain(..) {
-            // A worker that panicked has told the caller whose work it was.
+            // A worker's panic has already been propagated to the caller whose work it was.
             let _ = handle.join();
         }
     }
@@ -227,7 +228,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_worker_asks_the_callers_thread_which_may_use_the_worker_meanwhile() {
+    fn a_question_is_answered_on_the_calling_thread_which_may_use_the_workers() {
         for count in [1, 2, 3] {
             let threads = Threads::new(count).unwrap();
             let caller = thread::current().id();
@@ -261,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn no_more_threads_than_are_asked_for_and_0_is_what_the_process_may_use() {
+    fn the_count_is_the_requested_one_and_0_means_all_that_the_process_may_use() {
         assert_eq!(Threads::new(0).unwrap().count(), thread::available_parallelism().unwrap().get());
         assert_eq!(Threads::new(5).unwrap().count(), 5);
         let error = Threads::new(1025).unwrap_err().to_string();
@@ -273,7 +274,7 @@ mod tests {
         for count in [1, 2] {
             let threads = Threads { workers: of_process::as_in_a_fork(Threads::new(count).unwrap().workers) };
             let error = threads.check_process().unwrap_err().to_string();
-            assert!(error.starts_with("threads: made in process 1, of which this one, "), "{error}");
+            assert!(error.starts_with("threads: made in process 1, but this process, "), "{error}");
             let run = std::panic::AssertUnwindSafe(|| threads.run(|| ()));
             assert!(std::panic::catch_unwind(run).is_err());
         }
@@ -281,16 +282,16 @@ mod tests {
 
     #[test]
     #[cfg(target_os = "linux")]
-    fn the_threads_are_gone_when_the_handle_is() {
+    fn the_threads_end_when_the_handle_is_dropped() {
         let threads = Threads::new(3).unwrap();
-        // Each leaves its number in the system's list of threads.
+        // The entry of each thread in the system's list.
         let numbers: Vec<std::path::PathBuf> = threads.pool().unwrap().broadcast(|_| {
             let link = std::fs::read_link("/proc/thread-self").unwrap();
             std::path::Path::new("/proc").join(link)
         });
         assert!(numbers.len() == 3 && numbers.iter().all(|n| n.exists()));
         drop(threads);
-        // A thread that was joined runs nothing any more, but is listed until the kernel has buried it.
+        // A joined thread has ended, but is listed until the kernel has reaped it.
         let start = std::time::Instant::now();
         while numbers.iter().any(|n| n.exists()) && start.elapsed().as_secs() < 2 {
             thread::yield_now();
@@ -300,11 +301,11 @@ mod tests {
 
     #[test]
     #[cfg(target_os = "linux")]
-    fn workers_leave_signals_to_the_host_but_for_their_own_faults() {
+    fn workers_block_all_signals_except_their_own_faults() {
         let host = signals::mask_of_this_thread();
         let threads = Threads::new(2).unwrap();
         let workers = threads.pool().unwrap().broadcast(|_| signals::mask_of_this_thread());
-        assert_eq!(signals::mask_of_this_thread(), host, "the host's own thread is as it was");
+        assert_eq!(signals::mask_of_this_thread(), host, "the host's own thread is unchanged");
         // Signal n is bit n - 1: HUP 1, INT 2, ILL 4, TRAP 5, ABRT 6, BUS 7, FPE 8, SEGV 11, ALRM 14, TERM 15, PROF 27,
         // SYS 31.
         for mask in workers {

@@ -1,14 +1,14 @@
-//! Values that count on threads, and so on the process whose threads they are.
+//! Values that depend on threads, and so on the process that owns the threads.
 
 use crate::error::{Error, Result};
 use std::mem;
 use std::process;
 
-/// A value of the process that made it. A fork has none of its threads, holds its locks as they happened to be, and
-/// would wait for ever: it may neither use the value nor drop it.
+/// A value bound to the process that made it. A fork has none of its threads and holds its locks in whatever state they
+/// had, so it would wait forever: it must neither use the value nor drop it.
 #[derive(Debug)]
 pub struct OfProcess<T> {
-    /// `None` only while this is dropped.
+    /// `None` only during drop.
     value: Option<T>,
     process: u32,
 }
@@ -33,11 +33,11 @@ impl<T> OfProcess<T> {
             Some(value) if self.is_ours() => Ok(value),
             _ => {
                 let found = format!(
-                    "made in process {}, of which this one, {}, is a fork",
+                    "made in process {}, but this process, {}, is a fork of it",
                     self.process,
                     process::id()
                 );
-                Err(Error::argument(argument, found, "one that was made after the fork"))
+                Err(Error::argument(argument, found, "one made after the fork"))
             }
         }
     }
@@ -64,7 +64,7 @@ mod tests {
     use std::rc::Rc;
 
     #[test]
-    fn a_fork_is_told_and_leaves_the_value_alone() {
+    fn a_fork_gets_an_error_and_does_not_drop_the_value() {
         let value = Rc::new(7);
         let ours = OfProcess::new(Rc::clone(&value));
         assert_eq!(**ours.get("context").unwrap(), 7);
@@ -74,7 +74,8 @@ mod tests {
         assert_eq!(
             error,
             format!(
-                "context: made in process 1, of which this one, {here}, is a fork; allowed: one that was made after the fork"
+                "context: made in process 1, but this process, {here}, is a fork of it; \
+                 allowed: one made after the fork"
             )
         );
         drop(theirs);

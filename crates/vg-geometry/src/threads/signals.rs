@@ -1,12 +1,12 @@
-//! Signals of the process belong to the host: its handlers must find its own threads, not the library's workers.
+//! Signals of the process belong to the host: its handlers must run on its own threads, not on the library's workers.
 
-/// Runs `start`, which starts threads, with all signals blocked but those of a thread's own faults, which its threads
-/// inherit. The calling thread's mask is then as it was.
+/// Runs `start`, which starts threads, with all signals blocked except those of a thread's own faults. The new threads
+/// inherit this mask; the calling thread's own is restored.
 #[cfg(unix)]
 pub fn blocked<T>(start: impl FnOnce() -> T) -> T {
     use nix::sys::signal::{SigSet, SigmaskHow, Signal};
 
-    /// Puts a thread's mask back, also when what it guards panics.
+    /// Restores a thread's mask on drop, also during a panic.
     struct Restore(SigSet);
     impl Drop for Restore {
         fn drop(&mut self) {
@@ -32,13 +32,13 @@ pub fn blocked<T>(start: impl FnOnce() -> T) -> T {
     start()
 }
 
-/// There are no signals to block.
+/// Runs `start`: there are no signals to block.
 #[cfg(not(unix))]
 pub fn blocked<T>(start: impl FnOnce() -> T) -> T {
     start()
 }
 
-/// The blocked signals of the thread that asks, as the system lists them: bit n - 1 is signal n.
+/// The blocked signals of the calling thread, as the system lists them: bit n - 1 is signal n.
 #[cfg(all(test, target_os = "linux"))]
 pub(super) fn mask_of_this_thread() -> u64 {
     let status = std::fs::read_to_string("/proc/thread-self/status").expect("the system's list");

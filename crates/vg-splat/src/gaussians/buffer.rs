@@ -4,7 +4,7 @@ use super::sh;
 use std::ops::Range;
 use vg_geometry::{Error, Result};
 
-/// Smallest and largest standard deviation that is stored, metres (paper eq. `scale`).
+/// Smallest and largest stored standard deviation, metres. The smallest is the smallest normal f32.
 pub const SCALE_RANGE: std::ops::RangeInclusive<f32> = f32::MIN_POSITIVE..=1e9;
 
 /// Gaussians in the vehicle frame (x forward, y left, z up, metres), structure of arrays, f32.
@@ -37,14 +37,14 @@ pub struct Gaussian {
 }
 
 impl Gaussian {
-    /// Whether it meets the invariants of [`Gaussians`], its rotation's norm aside.
+    /// Whether it meets the invariants of [`Gaussians`], except for the norm of its rotation.
     pub fn is_storable(&self) -> bool {
         self.mean.iter().chain(&self.rotation).chain(&self.sh0).all(|v| v.is_finite())
             && self.scale.iter().all(|v| SCALE_RANGE.contains(v))
     }
 }
 
-/// All but the opacities: what mirroring and moving change, keeping the invariants.
+/// The arrays that mirroring and moving change (all but the opacities), keeping the invariants.
 pub(super) struct MovedArrays<'a> {
     pub(super) means: &'a mut [[f32; 3]],
     pub(super) rotations: &'a mut [[f32; 4]],
@@ -61,16 +61,17 @@ pub struct ArraysMut<'a> {
     pub rotations: &'a mut [[f32; 4]],
     /// Standard deviations, metres. `[n][3]`
     pub scales: &'a mut [[f32; 3]],
-    /// In [0, 1]. `[n]`
+    /// Opacities in [0, 1]. `[n]`
     pub opacities: &'a mut [f32],
     /// Coefficients of the colour. `[n][coefficient][3]`
     pub sh: &'a mut [f32],
 }
 
 impl Gaussians {
-    /// Arrays of `len` Gaussians of this degree, reusing memory; what they hold is to be written over.
+    /// Resizes to `len` Gaussians of this degree, reusing memory, and returns the arrays; their values must be
+    /// overwritten.
     #[doc(hidden)]
-    pub fn arrays_of(&mut self, sh_degree: u8, len: usize) -> ArraysMut<'_> {
+    pub fn resized_arrays_mut(&mut self, sh_degree: u8, len: usize) -> ArraysMut<'_> {
         self.sh_degree = sh_degree;
         self.means.resize(len, [0.0; 3]);
         self.rotations.resize(len, [1.0, 0.0, 0.0, 0.0]);
@@ -86,12 +87,12 @@ impl Gaussians {
         }
     }
 
-    /// Rotations, and the coefficients of all colours, which must stay finite.
+    /// The rotations, and the SH coefficients, which must stay finite.
     pub fn rotations_and_colors_mut(&mut self) -> (&[[f32; 4]], &mut [f32]) {
         (&self.rotations, &mut self.sh)
     }
 
-    /// None yet, with room for `capacity`, colour of SH degree `sh_degree` (0 to 3).
+    /// An empty set with room for `capacity` Gaussians, with colour of SH degree `sh_degree` (0 to 3).
     pub fn with_capacity(sh_degree: u8, capacity: usize) -> Self {
         assert!(sh_degree <= sh::MAX_DEGREE, "SH degree {sh_degree} is above {}", sh::MAX_DEGREE);
         Self {
@@ -104,9 +105,9 @@ impl Gaussians {
         }
     }
 
-    /// From arrays of n Gaussians. Quaternions (w, x, y, z) of any non-zero norm are normalised, those of unit norm to
-    /// the rounding of f32 are kept: a copy through arrays has the same bytes. Everything else that breaks an
-    /// invariant is an error that names the array and the index.
+    /// Makes n Gaussians from arrays. Quaternions (w, x, y, z) of any non-zero norm are normalised; those of unit norm
+    /// to the rounding of f32 are kept, so a copy through arrays has the same bytes. Any other broken invariant is an
+    /// error that names the array and the index.
     ///
     /// `means` `[n][3]` metres, `rotations` `[n][4]`, `scales` `[n][3]` standard deviations in metres,
     /// `opacities` `[n]`, `sh` `[n][(sh_degree + 1)^2][3]` RGB innermost.
@@ -205,8 +206,8 @@ impl Gaussians {
         self.sh.extend_from_slice(&other.sh);
     }
 
-    /// These, then those of `other`, at the higher of their SH degrees; missing bands are zero, which shows the same
-    /// colours.
+    /// These Gaussians followed by those of `other`, at the higher of their SH degrees; missing bands are zero, which
+    /// leaves the colours unchanged.
     pub fn merged(&self, other: &Self) -> Self {
         let mut out = Self::with_capacity(self.sh_degree.max(other.sh_degree), self.len() + other.len());
         let stride = out.sh_stride();
@@ -220,7 +221,7 @@ impl Gaussians {
         out
     }
 
-    /// Drops those without `keep[index]`, in place, keeping the order.
+    /// Removes the Gaussians without `keep[index]`, in place, keeping the order.
     pub fn retain(&mut self, keep: &[bool]) {
         assert_eq!(keep.len(), self.len(), "one flag per Gaussian");
         let runs = runs(keep);
@@ -236,7 +237,7 @@ impl Gaussians {
         );
     }
 
-    /// The first `len`.
+    /// Keeps the first `len` Gaussians.
     pub fn truncate(&mut self, len: usize) {
         let stride = self.sh_stride();
         self.means.truncate(len);
@@ -246,7 +247,7 @@ impl Gaussians {
         self.sh.truncate(len * stride);
     }
 
-    /// Those with `keep[index]`, in order.
+    /// The Gaussians with `keep[index]`, in order.
     pub fn filtered(&self, keep: &[bool]) -> Self {
         assert_eq!(keep.len(), self.len(), "one flag per Gaussian");
         let runs = runs(keep);
@@ -260,7 +261,7 @@ impl Gaussians {
         }
     }
 
-    /// Those at these indices, which are below the length, in this order.
+    /// The Gaussians at these indices, which must be below the length, in this order.
     pub(super) fn gathered(&self, indices: &[usize]) -> Self {
         let stride = self.sh_stride();
         Self {
@@ -283,12 +284,12 @@ impl Gaussians {
         }
     }
 
-    /// Appends a copy of those with `which[index]`, in order.
+    /// Appends a copy of the Gaussians with `which[index]`, in order.
     pub(super) fn append_copies(&mut self, which: &[bool]) {
         assert_eq!(which.len(), self.len(), "one flag per Gaussian");
         let runs = runs(which);
         let stride = self.sh_stride();
-        // Most of a Gaussian is its colour: two even halves of memory traffic.
+        // Colour takes most of a Gaussian's memory, so this split balances the traffic.
         rayon::join(
             || append_runs(&mut self.sh, &runs, stride),
             || {
@@ -300,12 +301,12 @@ impl Gaussians {
         );
     }
 
-    /// How many.
+    /// The number of Gaussians.
     pub fn len(&self) -> usize {
         self.means.len()
     }
 
-    /// Whether there is none.
+    /// Whether there are no Gaussians.
     pub fn is_empty(&self) -> bool {
         self.means.is_empty()
     }
@@ -358,7 +359,7 @@ impl Gaussians {
     }
 }
 
-/// Maximal runs of set flags: views' pixels come row by row, so there are few.
+/// Maximal runs of set flags. There are few, because pixels of views are stored row by row.
 fn runs(keep: &[bool]) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::new();
     for (i, _) in keep.iter().enumerate().filter(|(_, k)| **k) {
@@ -370,7 +371,7 @@ fn runs(keep: &[bool]) -> Vec<Range<usize>> {
     runs
 }
 
-/// Moves the runs together at the front and cuts the rest off.
+/// Moves the runs together at the front and truncates the rest.
 fn compact<T: Copy>(values: &mut Vec<T>, runs: &[Range<usize>], stride: usize) {
     let mut end = 0;
     for run in runs {
@@ -383,7 +384,7 @@ fn compact<T: Copy>(values: &mut Vec<T>, runs: &[Range<usize>], stride: usize) {
     values.truncate(end);
 }
 
-/// Copies the runs to the end.
+/// Appends copies of the runs.
 fn append_runs<T: Copy>(values: &mut Vec<T>, runs: &[Range<usize>], stride: usize) {
     values.reserve(runs.iter().map(|r| r.len() * stride).sum());
     for run in runs {
@@ -402,7 +403,7 @@ fn append_padded(values: &mut Vec<f32>, pieces: &[f32], stride: usize, padded: u
     }
 }
 
-/// The runs, one after the other.
+/// The concatenated runs.
 fn gather<T: Copy>(values: &[T], runs: &[Range<usize>], stride: usize) -> Vec<T> {
     let mut out = Vec::with_capacity(runs.iter().map(|r| r.len() * stride).sum());
     for run in runs {
@@ -411,8 +412,8 @@ fn gather<T: Copy>(values: &[T], runs: &[Range<usize>], stride: usize) -> Vec<T>
     out
 }
 
-/// The unit quaternion along `q`, or `None` for zero or non-finite ones. In f64, where the square of no finite
-/// f32 over- or underflows.
+/// The unit quaternion along `q`; `None` if it is zero or not finite. Computed in f64, where the square of a finite f32
+/// neither overflows nor underflows.
 pub fn normalize_quaternion(q: [f32; 4]) -> Option<[f32; 4]> {
     let norm = q.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>().sqrt();
     (norm > 0.0 && norm.is_finite()).then(|| q.map(|v| (f64::from(v) / norm) as f32))
@@ -420,8 +421,8 @@ pub fn normalize_quaternion(q: [f32; 4]) -> Option<[f32; 4]> {
 
 /// Whether the norm of `q` is 1 to the rounding of f32.
 fn is_unit(q: [f32; 4]) -> bool {
-    // Entries that are rounded once move the square of the norm by 2^-23; rotations that heads compute in f32 are off by
-    // up to twice that.
+    // Rounding each entry once moves the square of the norm by 2^-23; rotations that heads compute in f32 are off by up
+    // to twice that.
     const SQUARED: f64 = 8.0 * f32::EPSILON as f64;
     (q.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>() - 1.0).abs() <= SQUARED
 }
@@ -446,9 +447,9 @@ mod tests {
 
     #[test]
     fn a_copy_through_arrays_has_the_same_bytes() {
-        // Normalising these twice moves last bits of every fourth or so.
-        let of = |i: u32| [1.0, 0.3, -0.7, 0.2].map(|v: f32| (v * (i as f32 + 0.5) * 1.7).sin());
-        let rotations: Vec<_> = (0..200).map(|i| normalize_quaternion(of(i)).unwrap()).collect();
+        // Normalising these twice would change the last bits of about every fourth.
+        let rotation = |i: u32| [1.0, 0.3, -0.7, 0.2].map(|v: f32| (v * (i as f32 + 0.5) * 1.7).sin());
+        let rotations: Vec<_> = (0..200).map(|i| normalize_quaternion(rotation(i)).unwrap()).collect();
         assert!(rotations.iter().any(|&q| normalize_quaternion(q) != Some(q)));
         for q in rotations {
             assert_eq!(one(q, [1.0; 3], 1.0).unwrap().rotations()[0], q);

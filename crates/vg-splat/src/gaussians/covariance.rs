@@ -4,8 +4,8 @@ use super::buffer::Gaussians;
 use glam::{DMat3, DQuat, DVec3};
 
 impl Gaussians {
-    /// Covariance matrices in the vehicle frame, square metres: xx, xy, xz, yy, yz, zz of each, as 3D Gaussian Splatting
-    /// orders them. Computed in f64; what is below the smallest f32 becomes 0. `[n][6]`
+    /// Covariance matrices in the vehicle frame, square metres: xx, xy, xz, yy, yz, zz of each, in the order of 3D
+    /// Gaussian Splatting. Computed in f64; values below the smallest f32 become 0. `[n][6]`
     pub fn covariances(&self) -> Vec<[f32; 6]> {
         self.rotations().iter().zip(self.scales()).map(|(q, s)| covariance(*q, *s)).collect()
     }
@@ -33,7 +33,7 @@ mod tests {
             .unwrap();
         let [first, second] = g.covariances().try_into().unwrap();
         let near = |a: f32, b: f64, tolerance: f64| (f64::from(a) - b).abs() <= tolerance;
-        // Quaternions are rounded to 6e-8.
+        // Quaternions are accurate to 6e-8.
         let expected = [9.0, 0.0, 0.0, 4.0, 0.0, 0.25];
         assert!(first.iter().zip(expected).all(|(a, b)| near(*a, b, 2e-6)), "{first:?}");
         // By hand: the columns of R for (0.8, 0.2, -0.4, 0.4), 2 (x y + w z) = 2 (-0.08 + 0.32) for one.

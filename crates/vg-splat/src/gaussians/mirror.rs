@@ -21,7 +21,7 @@ impl Gaussians {
         self.append_mirrored_of(&vec![true; self.len()]);
     }
 
-    /// Appends the mirror images of those with `which[index]`, in order.
+    /// Appends the mirror images of the Gaussians with `which[index]`, in order.
     pub fn append_mirrored_of(&mut self, which: &[bool]) {
         let n = self.len();
         self.append_copies(which);

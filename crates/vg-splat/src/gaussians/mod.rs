@@ -1,4 +1,4 @@
-//! 3D Gaussians as a structure of arrays, and the algebra on them that knows nothing of where they came from.
+//! 3D Gaussians as a structure of arrays, and the algebra on them, which does not depend on their origin.
 
 pub mod buffer;
 mod covariance;

@@ -1,14 +1,14 @@
-//! Parts of a set of Gaussians: by a mask, by indices, by a box, by opacity.
+//! Selection of Gaussians by a mask, by indices, by a box, or by opacity.
 
 use super::buffer::Gaussians;
 use std::cmp::Ordering::{Equal, Less};
 use vg_geometry::{Error, Result};
 
 impl Gaussians {
-    /// Those at `indices`, in that order; an index may come again.
+    /// The Gaussians at `indices`, in that order; an index may occur more than once.
     ///
     /// # Errors
-    /// An index that no Gaussian has, named `indices[k]`.
+    /// An index is not below the number of Gaussians; the error names it as `indices[k]`.
     pub fn selected(&self, indices: &[usize]) -> Result<Self> {
         if let Some(k) = indices.iter().position(|&i| i >= self.len()) {
             let allowed = format!("below {}, the number of Gaussians", self.len());
@@ -17,10 +17,10 @@ impl Gaussians {
         Ok(self.gathered(indices))
     }
 
-    /// Those with `keep[index]`, in order.
+    /// The Gaussians with `keep[index]`, in order.
     ///
     /// # Errors
-    /// `keep` has not one flag per Gaussian.
+    /// `keep` does not have one flag per Gaussian.
     pub fn masked(&self, keep: &[bool]) -> Result<Self> {
         if keep.len() != self.len() {
             let allowed = format!("{}, one per Gaussian", self.len());
@@ -29,10 +29,11 @@ impl Gaussians {
         Ok(self.filtered(keep))
     }
 
-    /// Those whose centre lies in the box from `low` to `high`, metres, its faces included, in order.
+    /// The Gaussians whose centre lies in the box from `low` to `high`, metres, its faces included, in order. A side at
+    /// infinity is open.
     ///
     /// # Errors
-    /// A NaN, or `low` above `high`. Infinite sides are open.
+    /// A bound is NaN, or `low` is above `high`.
     pub fn cropped(&self, low: [f32; 3], high: [f32; 3]) -> Result<Self> {
         let ordered = |k: &usize| matches!(low[*k].partial_cmp(&high[*k]), Some(Less | Equal));
         if let Some(k) = (0..3).find(|k| !ordered(k)) {
@@ -43,10 +44,10 @@ impl Gaussians {
         Ok(self.filtered(&self.means().iter().map(inside).collect::<Vec<_>>()))
     }
 
-    /// Those with a peak opacity of `least` or more, in order.
+    /// The Gaussians with a peak opacity of at least `least`, in order.
     ///
     /// # Errors
-    /// `least` is not 0 to 1.
+    /// `least` is not within 0 to 1.
     pub fn with_opacity_of(&self, least: f32) -> Result<Self> {
         if !(0.0..=1.0).contains(&least) {
             return Err(Error::argument("least", least.to_string(), "0 to 1"));
@@ -59,7 +60,7 @@ impl Gaussians {
 mod tests {
     use super::*;
 
-    /// Each with numbers that tell it from the others.
+    /// Five Gaussians, each with distinct numbers.
     fn five() -> Gaussians {
         let all = |f: fn(f32) -> f32| (0..5).map(move |i| f(i as f32));
         Gaussians::from_arrays(
@@ -74,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn indices_give_those_gaussians_in_their_order_with_all_they_have() {
+    fn indices_select_whole_gaussians_in_their_order() {
         let g = five();
         let found = g.selected(&[3, 0, 3]).unwrap();
         assert_eq!(found.means(), [g.means()[3], g.means()[0], g.means()[3]]);
@@ -89,11 +90,11 @@ mod tests {
     }
 
     #[test]
-    fn a_mask_a_box_and_an_opacity_select_what_indices_do() {
+    fn a_mask_a_box_and_an_opacity_select_as_the_equivalent_indices_do() {
         let g = five();
         let picked = |indices: &[usize]| g.selected(indices).unwrap();
         assert_eq!(g.masked(&[false, true, true, false, true]).unwrap(), picked(&[1, 2, 4]));
-        // Faces belong to the box.
+        // The faces belong to the box.
         assert_eq!(g.cropped([1.0, -9.0, 0.0], [3.0, -1.0, 1.0]).unwrap(), picked(&[1, 2]));
         let open = f32::INFINITY;
         assert_eq!(g.cropped([-open; 3], [open; 3]).unwrap(), g);
@@ -101,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn masks_boxes_and_opacities_that_mean_nothing_are_refused_by_name() {
+    fn invalid_masks_boxes_and_opacities_are_refused_by_name() {
         let g = five();
         for (found, beginning) in [
             (g.masked(&[true; 4]), "keep: 4 flags"),

@@ -14,7 +14,7 @@ pub const fn coefficients(degree: u8) -> usize {
     (degree as usize + 1) * (degree as usize + 1)
 }
 
-/// Whether basis function `k` is odd in y, that is, of order m < 0: the ones that change sign under y -> -y.
+/// Whether basis function `k` is odd in y (order m < 0), so that it changes sign under y -> -y.
 pub const ODD_IN_Y: [bool; 16] = [
     false, // l = 0
     true, false, false, // l = 1
@@ -22,12 +22,12 @@ pub const ODD_IN_Y: [bool; 16] = [
     true, true, true, false, false, false, false, // l = 3
 ];
 
-/// RGB2SH of the paper: coefficient of degree 0 that shows colour `rgb` in [0, 1]: 2 sqrt(pi) (rgb - 0.5).
+/// Coefficient of degree 0 of colour `rgb` in [0, 1], RGB2SH of the paper: 2 sqrt(pi) (rgb - 0.5).
 pub fn from_rgb(rgb: [f32; 3]) -> [f32; 3] {
     rgb.map(|c| (c - 0.5) / Y0)
 }
 
-/// The colour a coefficient of degree 0 shows.
+/// Colour of a coefficient of degree 0.
 pub fn to_rgb(sh0: [f32; 3]) -> [f32; 3] {
     sh0.map(|c| c * Y0 + 0.5)
 }

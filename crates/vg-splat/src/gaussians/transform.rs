@@ -1,8 +1,8 @@
 //! Gaussians moved into another frame by a similarity p_to = s R p_from + t.
 //!
-//! mu' = s R mu + t and Sigma' = s^2 R Sigma R^T: R goes in front of the Gaussian's own rotation, standard deviations
-//! grow by s. Colour: along R d the moved Gaussian shows what the given one shows along d. Band l of the harmonics
-//! only mixes within itself under a rotation, so that this is one orthogonal (2l + 1)-matrix per band.
+//! mu' = s R mu + t and Sigma' = s^2 R Sigma R^T: the Gaussian's own rotation is multiplied by R from the left, its
+//! standard deviations by s. The moved Gaussian has along R d the colour that the given one has along d. Under a
+//! rotation, band l of the harmonics mixes only within itself, so this is one orthogonal (2l + 1)-matrix per band.
 
 use super::buffer::{Gaussians, MovedArrays, SCALE_RANGE};
 use super::sh;
@@ -11,21 +11,21 @@ use rayon::prelude::*;
 use vg_geometry::{Error, Result};
 use vg_geometry::{Pose, Similarity};
 
-/// Coordinates of means stay below this, metres. An f32 has 24 significant bits: from 2^e to 2^(e + 1) its step is
+/// Limit of the coordinates of means, metres. An f32 has 24 significant bits: from 2^e to 2^(e + 1) its step is
 /// 2^(e - 23), which is 0.98 mm below 2^14 m and 1.95 mm from there on.
 pub const MAX_COORDINATE_M: f32 = 16_384.0;
 
 impl Gaussians {
-    /// The same Gaussians in another frame, in the same order. The identity returns the same bytes, a translation
-    /// leaves rotations and colours as they are, and the result is the same for any number of threads.
+    /// These Gaussians in another frame, in the same order. The identity returns the same bytes, a translation does not
+    /// change rotations and colours, and the result is the same for any number of threads.
     ///
-    /// Everything is computed in f64 and stored in f32; a colour seen along the turned direction is the colour that
-    /// was seen before to 1e-6 of the length of the coefficients.
+    /// Everything is computed in f64 and stored in f32; the colour along a rotated direction equals the original one to
+    /// 1e-6 of the length of the coefficients.
     ///
     /// # Errors
     /// The similarity is not finite, not a rotation with a positive scale, or would move
-    /// * a mean to [`MAX_COORDINATE_M`] or beyond, where an f32 cannot hold a millimetre: leave the Gaussians in the
-    ///   vehicle's frame then, and move the cameras, whose poses are f64;
+    /// * a mean to [`MAX_COORDINATE_M`] or beyond, where an f32 cannot represent a millimetre: leave the Gaussians in
+    ///   the vehicle frame then, and move the cameras, whose poses are f64;
     /// * a standard deviation out of [`SCALE_RANGE`];
     /// * an SH coefficient beyond the largest f32.
     pub fn transformed(&self, to_from_vehicle: &Similarity) -> Result<Self> {
@@ -51,12 +51,12 @@ impl Gaussians {
     }
 }
 
-/// Gaussians per piece: small enough to keep all threads busy.
+/// Gaussians per parallel chunk: small enough to keep all threads busy.
 const CHUNK: usize = 1 << 13;
 
 const ARGUMENT: &str = "to_from_vehicle";
 
-/// Its fields are public: nothing else has checked them.
+/// Checks the similarity, whose public fields may hold anything, and removes noise from its rotation.
 fn checked(similarity: &Similarity) -> Result<Similarity> {
     let scale = similarity.scale;
     if !(scale.is_finite() && scale > 0.0) {
@@ -86,7 +86,8 @@ fn turn_rotations(rotations: &mut [[f32; 4]], turn: DQuat) {
     }
 }
 
-/// What was moved still meets the invariants. The first that does not is named, whichever thread made it.
+/// Checks that the moved Gaussians still meet the invariants. The error names the first that does not, whatever the
+/// number of threads.
 fn check_moved(moved: &Gaussians) -> Result<()> {
     // Written so that NaN fails.
     let held = |c: &f32| c.abs() < MAX_COORDINATE_M;
@@ -115,7 +116,7 @@ fn check_moved(moved: &Gaussians) -> Result<()> {
     Ok(())
 }
 
-/// How bands 1 to 3 mix: moved = matrix given, row-major.
+/// Matrices by which bands 1 to 3 mix: moved = matrix given, row-major.
 struct BandRotations {
     one: [[f64; 3]; 3],
     two: [[f64; 5]; 5],
@@ -127,7 +128,7 @@ impl BandRotations {
         Self { one: band_rotation(rotation), two: band_rotation(rotation), three: band_rotation(rotation) }
     }
 
-    /// Coefficients `[n][stride / 3][3]`.
+    /// Rotates the coefficients `[n][stride / 3][3]`.
     fn turn_colors(&self, sh: &mut [f32], stride: usize) {
         for one in sh.as_chunks_mut::<3>().0.chunks_exact_mut(stride / 3) {
             turn_band(&self.one, &mut one[1..]);
@@ -154,10 +155,10 @@ fn turn_band<const N: usize>(matrix: &[[f64; N]; N], band: &mut [[f32; 3]]) {
     }
 }
 
-/// The matrix of the band of N = 2l + 1 functions. The moved colour along e is the given one along R^T e; the basis
-/// is orthonormal, so that entry j, k is the integral of Y_j(e) Y_k(R^T e) over the sphere. A quadrature that is
-/// exact for it needs no recursion's sign conventions and inverts nothing: it holds for whatever `sh::basis` says,
-/// to the rounding of f64.
+/// The matrix of the band of N = 2l + 1 functions. The moved colour along e is the given one along R^T e; the basis is
+/// orthonormal, so entry j, k is the integral of Y_j(e) Y_k(R^T e) over the sphere. An exact quadrature avoids the sign
+/// conventions of the usual recursions and any inversion: it is right for the basis of `sh::basis`, whatever its signs
+/// and order, to the rounding of f64.
 fn band_rotation<const N: usize>(rotation: DMat3) -> [[f64; N]; N] {
     let first = (N / 2) * (N / 2); // functions in the bands below
     let from_to = rotation.transpose();

@@ -1,4 +1,4 @@
-//! How much two pictures differ: PSNR and SSIM.
+//! Differences between two pictures: PSNR and SSIM.
 
 mod ssim;
 
@@ -6,14 +6,15 @@ pub use ssim::{Reference, WINDOW, ssim};
 
 use vg_geometry::{Error, Result};
 
-/// What pictures in [0, 1] may hold: spherical harmonics overshoot white by tenths. What lies farther out is not of this
-/// range (0 to 255, for one), and clamped it would be equal to anything as bright.
+/// Range of values accepted in pictures that are nominally in [0, 1]: spherical harmonics overshoot white by tenths.
+/// Values farther out mean another range, such as 0 to 255; clamping them would hide all differences.
 pub const COLORS: std::ops::RangeInclusive<f32> = -1.0..=2.0;
 
-/// All finite and within [`COLORS`]; `argument` names the picture, whose rows have `width` pixels of `channels`.
+/// Checks that all values are finite and within [`COLORS`]; `argument` names the picture, whose rows have `width`
+/// pixels of `channels`.
 ///
 /// # Errors
-/// [`Error::Argument`] that names the first number that is not.
+/// [`Error::Argument`] that names the first number outside.
 pub fn check_colors(argument: &str, values: &[f32], width: usize, channels: usize) -> Result<()> {
     let Some(at) = values.iter().position(|v| !COLORS.contains(v)) else { return Ok(()) };
     let (row, column) = (at / (width * channels), at / channels % width);
@@ -21,8 +22,8 @@ pub fn check_colors(argument: &str, values: &[f32], width: usize, channels: usiz
     Err(Error::argument(format!("{argument}[{row}, {column}]"), values[at].to_string(), allowed))
 }
 
-/// Peak signal-to-noise ratio of two pictures in [0, 1], dB; values outside are clamped first, as a display
-/// would. Identical pictures give infinity.
+/// Peak signal-to-noise ratio of two pictures in [0, 1], dB; values outside are clamped first, as on a display.
+/// Returns infinity for identical pictures.
 pub fn psnr(a: &[[f32; 3]], b: &[[f32; 3]]) -> f64 {
     assert_eq!(a.len(), b.len(), "pictures of different sizes");
     let squared = |(a, b): (&[f32; 3], &[f32; 3])| -> f64 {

@@ -2,9 +2,9 @@
 //! it with `gaussian_weights=True, use_sample_covariance=False, data_range=1`: the mean over channels and over
 //! pixels whose window lies inside the picture.
 //!
-//! It is measured as what it lacks to 1, window by window, with its exact adjoint, for an optimisation takes both at
-//! every step. What one of the two pictures alone says is kept ([`Reference`]), and only windows that see a difference
-//! are looked at: the others lack nothing. Rows are worked on in parallel and summed in order.
+//! The code sums 1 - SSIM over windows and computes its exact adjoint, because an optimisation needs both at every
+//! step. The part that depends on one picture alone is kept ([`Reference`]), and only windows that contain a difference
+//! are evaluated: the others add 0. Rows are processed in parallel and summed in order.
 
 use rayon::prelude::*;
 
@@ -14,8 +14,8 @@ pub const WINDOW: usize = 2 * RADIUS + 1;
 const C1: f64 = 0.01 * 0.01;
 const C2: f64 = 0.03 * 0.03;
 
-/// SSIM of two RGB pictures in [0, 1] (values outside are clamped), `width` columns wide, or `None` where the
-/// picture is smaller than the window.
+/// SSIM of two RGB pictures in [0, 1] (values outside are clamped), `width` columns wide; `None` where the picture is
+/// smaller than the window.
 pub fn ssim(a: &[[f32; 3]], b: &[[f32; 3]], width: u32, height: u32) -> Option<f64> {
     let (w, h) = (width as usize, height as usize);
     assert!(a.len() == w * h && b.len() == w * h, "pictures of different sizes");
@@ -27,7 +27,7 @@ pub fn ssim(a: &[[f32; 3]], b: &[[f32; 3]], width: u32, height: u32) -> Option<f
     Some(1.0 - reference.dissimilarity(a, 1.0 / (3 * windows) as f64, None, None))
 }
 
-/// A picture that others are compared with.
+/// A picture to compare others with.
 #[derive(Clone, Debug)]
 pub struct Reference {
     width: usize,
@@ -38,15 +38,15 @@ pub struct Reference {
 /// One channel, and its means in every window inside the picture.
 #[derive(Clone, Debug)]
 struct Channel {
-    /// In [0, 1]. `[h * w]`
+    /// Values in [0, 1]. `[h * w]`
     values: Vec<f64>,
-    /// `[(h - 10) * (w - 10)]`
+    /// Mean of each window. `[(h - 10) * (w - 10)]`
     mean: Vec<f64>,
-    /// Of the squares. `[(h - 10) * (w - 10)]`
+    /// Mean of the squares in each window. `[(h - 10) * (w - 10)]`
     square: Vec<f64>,
 }
 
-/// The pixels of all windows that see a difference.
+/// The rectangle of pixels that covers all windows with a difference.
 #[derive(Clone, Copy, Debug)]
 struct Area {
     left: usize,
@@ -56,7 +56,7 @@ struct Area {
 }
 
 impl Reference {
-    /// Of `w * h` pixels, at least as large as the window.
+    /// Prepares a picture of `w * h` pixels, at least as large as the window.
     pub(crate) fn new(image: &[[f32; 3]], w: usize, h: usize) -> Self {
         let whole = Area { left: 0, top: 0, columns: w, rows: h };
         let channel = |c: usize| {
@@ -79,8 +79,8 @@ impl Reference {
         Self { width: w, height: h, channels: std::array::from_fn(channel) }
     }
 
-    /// The sum of `1 - SSIM` over channels and windows, each `factor` times what `mask` has at its middle. Adds the
-    /// gradient to `slopes`; colours outside [0, 1] have none. `[h * w]` each.
+    /// The sum of `1 - SSIM` over channels and windows, each weighted by `factor` times the `mask` at its middle. Adds
+    /// the gradient to `slopes`; it is 0 for colours outside [0, 1]. `[h * w]` each.
     pub(crate) fn dissimilarity(
         &self,
         image: &[[f32; 3]],
@@ -89,10 +89,10 @@ impl Reference {
         mut slopes: Option<&mut [[f32; 3]]>,
     ) -> f64 {
         let Some(area) = self.differing(image) else { return 0.0 };
-        (0..3).map(|c| self.of_channel(c, area, image, factor, mask, slopes.as_deref_mut())).sum()
+        (0..3).map(|c| self.channel_dissimilarity(c, area, image, factor, mask, slopes.as_deref_mut())).sum()
     }
 
-    /// The windows that see a difference; `None` where there is none.
+    /// The area of windows that contain a difference; `None` where there is none.
     fn differing(&self, image: &[[f32; 3]]) -> Option<Area> {
         let (w, h) = (self.width, self.height);
         let differs = |i: usize| (0..3).any(|c| clamped(&image[i], c) != self.channels[c].values[i]);
@@ -104,13 +104,13 @@ impl Reference {
         let wider =
             |a: [usize; 4], b: [usize; 4]| [a[0].min(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].max(b[3])];
         let [x0, x1, y0, y1] = (0..h).into_par_iter().filter_map(columns).reduce_with(wider)?;
-        // Of a window's first pixel.
+        // First pixels of the first windows.
         let (left, top) = (x0.saturating_sub(WINDOW - 1), y0.saturating_sub(WINDOW - 1));
         let (right, bottom) = (x1.min(w - WINDOW), y1.min(h - WINDOW));
         Some(Area { left, top, columns: right - left + WINDOW, rows: bottom - top + WINDOW })
     }
 
-    fn of_channel(
+    fn channel_dissimilarity(
         &self,
         c: usize,
         area: Area,
@@ -132,7 +132,7 @@ impl Reference {
             }
         });
 
-        // What each window lacks, and that of its slopes which falls to each column.
+        // 1 - SSIM of each window, and its slopes spread along the row to each column.
         let mut back = vec![0.0; if slopes.is_some() { 3 * columns * (area.rows + 1 - WINDOW) } else { 0 }];
         let one = |v: usize, back: &mut [f64]| {
             let mut moments = [vec![0.0; inner], vec![0.0; inner], vec![0.0; inner]];
@@ -152,7 +152,7 @@ impl Reference {
                 [*x, *xx, *xy] = slopes.map(|slope| -weight * slope);
             }
             for (moment, back) in moments.iter().zip(back.chunks_exact_mut(columns)) {
-                // The window is as wide to the left as to the right: spreading is averaging of what zeros surround.
+                // The window is symmetric, so spreading equals averaging of the slopes padded with zeros.
                 let mut padded = vec![0.0; columns + WINDOW - 1];
                 padded[WINDOW - 1..][..inner].copy_from_slice(moment);
                 along(&padded, back);
@@ -178,11 +178,11 @@ impl Reference {
                     }
                 }
             }
-            let [of_x, of_xx, of_xy] = &spread;
-            let of_moments = of_x.iter().zip(of_xx).zip(of_xy);
+            let [d_x, d_xx, d_xy] = &spread;
+            let d_moments = d_x.iter().zip(d_xx).zip(d_xy);
             let pixels = image[row(v)..].iter().zip(&values[row(v)..]);
             for ((slope, ((x, xx), xy)), (pixel, value)) in
-                slopes[left..].iter_mut().zip(of_moments).zip(pixels)
+                slopes[left..].iter_mut().zip(d_moments).zip(pixels)
             {
                 if (0.0..=1.0).contains(&pixel[c]) {
                     slope[c] += (x + 2.0 * f64::from(pixel[c]) * xx + value * xy) as f32;
@@ -196,7 +196,7 @@ impl Reference {
 }
 
 impl Area {
-    /// Averages along each row, of up to three planes that `fill` makes: `[rows][3][columns - 10]`.
+    /// Averages of up to three planes, which `fill` makes, along each row: `[rows][3][columns - 10]`.
     fn across(self, fill: impl Fn(usize, [&mut [f64]; 3]) + Sync) -> Vec<f64> {
         let inner = self.columns + 1 - WINDOW;
         let mut out = vec![0.0; 3 * inner * self.rows];
@@ -235,13 +235,13 @@ impl Window {
         let variance = (xx - x * x) + (yy - y * y) + C2;
         let below = 1.0 / (energy * variance);
         let ssim = luminance * structure * below;
-        // The structure and the variance hold -x y and -x^2 too.
-        let of_x = 2.0 * y * (structure - luminance) * below + 2.0 * x * ssim * (energy - variance) * below;
-        (ssim, [of_x, -ssim * energy * below, 2.0 * luminance * below])
+        // The structure and the variance depend on x through -x y and -x^2 too.
+        let d_x = 2.0 * y * (structure - luminance) * below + 2.0 * x * ssim * (energy - variance) * below;
+        (ssim, [d_x, -ssim * energy * below, 2.0 * luminance * below])
     }
 }
 
-/// In [0, 1].
+/// Channel `c` of the pixel, clamped to [0, 1].
 #[inline(always)]
 fn clamped(pixel: &[f32; 3], c: usize) -> f64 {
     f64::from(pixel[c].clamp(0.0, 1.0))
@@ -286,10 +286,11 @@ fn down(across: &[f64], [v, inner]: [usize; 2], plane: usize, out: &mut [f64]) {
     }
 }
 
-/// Compiled for the processor's widest vectors; they are never fused, so every processor gives the same bytes.
+/// Runs `work` compiled for the processor's widest vectors. Multiply-add is never fused, so every processor gives the
+/// same bytes.
 #[inline(always)]
 fn wide<R>(work: impl FnOnce() -> R) -> R {
-    #[allow(clippy::redundant_closure)] // only a closure can be told to be inlined where the vectors are
+    #[allow(clippy::redundant_closure)] // only a closure can be inlined into the vectorised function
     pulp::Arch::new().dispatch(
         #[inline(always)]
         || work(),
@@ -335,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn differences_wherever_they_are_count_as_defined() {
+    fn differences_anywhere_give_the_sum_of_the_definition() {
         let (w, h) = (24, 19);
         let image: Vec<[f32; 3]> =
             (0..w * h).map(|i| [0, 1, 2].map(|c| ((i * 7919 + c * 613) % 1100) as f32 / 1000.0)).collect();

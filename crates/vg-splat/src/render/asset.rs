@@ -1,4 +1,4 @@
-//! Gaussians that are drawn many times: who draws is chosen once, and a device keeps its copy of them.
+//! Gaussians that are drawn many times: the backend is chosen once, and a device keeps its copy of them.
 
 #[cfg(not(feature = "gpu"))]
 use super::backend::not_built;
@@ -12,11 +12,11 @@ use vg_geometry::Error;
 use vg_geometry::Result;
 use vg_geometry::progress::{UNWATCHED, Watch};
 
-/// Below this many Gaussians [`Backend::Auto`] leaves the graphics processor alone: the CPU draws 20,000 in the few
-/// milliseconds that a picture's way to the device and back may take.
+/// Number of Gaussians from which [`Backend::Auto`] uses a graphics processor: the CPU draws 20,000 in the few
+/// milliseconds that the transfer of a picture may take.
 pub const WORTH_A_DEVICE: usize = 20_000;
 
-/// Gaussians made ready to be drawn many times.
+/// Gaussians prepared to be drawn many times.
 ///
 /// ```
 /// # use std::sync::Arc;
@@ -35,7 +35,7 @@ pub struct AssetRenderer {
     gaussians: Arc<Gaussians>,
     cpu: CpuRenderer,
     state: Mutex<State>,
-    /// Whether the CPU may stand in for a device that fails.
+    /// Whether the CPU may replace a device that fails.
     may_fall_back: bool,
 }
 
@@ -54,11 +54,11 @@ struct OnDevice {
 }
 
 impl AssetRenderer {
-    /// Chooses, and copies the Gaussians to the device where that is the choice.
+    /// Chooses the backend, and copies the Gaussians to the device where that is the choice.
     ///
-    /// Errors, for [`Backend::Gpu`] alone: [`NotBuilt`](vg_geometry::Error::NotBuilt) in a build without the feature `gpu`,
-    /// [`Missing`](vg_geometry::Error::Missing) without a driver, [`Argument`](vg_geometry::Error::Argument) for more Gaussians than
-    /// the device can take.
+    /// Errors, for [`Backend::Gpu`] alone: [`NotBuilt`](crate::Error::NotBuilt) in a build without the feature `gpu`,
+    /// [`Missing`](crate::Error::Missing) without a driver, [`Argument`](crate::Error::Argument) for more Gaussians
+    /// than fit the device.
     pub fn new(gaussians: Arc<Gaussians>, backend: Backend) -> Result<Self> {
         let cpu = CpuRenderer::new();
         let on_cpu =
@@ -80,7 +80,7 @@ impl AssetRenderer {
         Ok(Self { gaussians, cpu, state: Mutex::new(state), may_fall_back })
     }
 
-    /// What draws, and why. It changes when a device fails under [`Backend::Auto`].
+    /// The backend in use, and the reason. It changes when a device fails under [`Backend::Auto`].
     pub fn choice(&self) -> Choice {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).choice.clone()
     }
@@ -90,18 +90,18 @@ impl AssetRenderer {
         &self.gaussians
     }
 
-    /// One picture. The camera may be distorted; it is validated.
+    /// Renders one picture. The camera may be distorted; it is validated.
     pub fn render(&self, camera: &Camera, options: &RenderOptions) -> Result<Rendered> {
         let mut target = Rendered::default();
         self.render_into(camera, options, &mut target)?;
         Ok(target)
     }
 
-    /// As [`AssetRenderer::render`], into a picture whose memory is reused: planes, or 8 bits, which are less to fetch from
-    /// a device.
+    /// As [`AssetRenderer::render`], into a picture whose memory is reused: planes, or 8 bits, which are less to fetch
+    /// from a device.
     ///
-    /// Errors of the device ([`Missing`](vg_geometry::Error::Missing)) end the call, or under [`Backend::Auto`] the device's
-    /// part: the CPU draws this picture and those that follow.
+    /// Errors of the device ([`Missing`](crate::Error::Missing)) end the call, but not under [`Backend::Auto`]: there
+    /// the CPU draws this picture and all further ones.
     pub fn render_into<P: Picture>(
         &self,
         camera: &Camera,
@@ -130,10 +130,10 @@ impl AssetRenderer {
         target.draw(self.cpu.watched(watch), &self.gaussians, camera, options)
     }
 
-    /// A picture for each camera, made in the memory of `picture` and handed to `take` in their order with the camera's
-    /// number. While `take` has one, a device draws the next.
+    /// Renders a picture for each camera into the memory of `picture` and passes it to `take` with the camera's index,
+    /// in order. While `take` runs, a device draws the next.
     ///
-    /// Errors: those of `take`, and of [`AssetRenderer::render_into`] for the camera that comes first.
+    /// Errors: those of `take`, and of [`AssetRenderer::render_into`] for the first camera that has one.
     pub fn render_each<P: Picture>(
         &self,
         cameras: &[Camera],
@@ -144,7 +144,7 @@ impl AssetRenderer {
         self.render_each_watched(cameras, options, picture, &UNWATCHED, take)
     }
 
-    /// As [`AssetRenderer::render_each`], under `watch`, which is told of every picture.
+    /// As [`AssetRenderer::render_each`], under `watch`, which gets a report after every picture.
     pub fn render_each_watched<P: Picture>(
         &self,
         cameras: &[Camera],
@@ -198,7 +198,7 @@ impl AssetRenderer {
         self.device().map(|d| Arc::clone(&d.renderer))
     }
 
-    /// As if [`Backend::Auto`] had been asked for, for tests on machines whose only device is software.
+    /// Falls back as under [`Backend::Auto`], for tests on machines whose only device is software.
     #[doc(hidden)]
     pub fn falling_back(mut self) -> Self {
         self.may_fall_back = true;
@@ -218,7 +218,7 @@ impl State {
     #[cfg(feature = "gpu")]
     fn gpu(gaussians: &Gaussians, backend: Backend) -> Result<Self> {
         use super::{Adapter, GpuRenderer};
-        // Asked for by name, a driver that draws on the CPU is what there is; unasked it is no gain.
+        // A driver that draws on the CPU is used only on explicit request: under `Auto` it brings no gain.
         let adapter = if backend == Backend::Gpu { Adapter::Any } else { Adapter::Hardware };
         let renderer = GpuRenderer::shared(adapter)?;
         let asset = renderer.upload(gaussians)?;
@@ -241,7 +241,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_choice_says_what_and_why() {
+    fn the_choice_contains_the_backend_and_the_reason() {
         let few = Arc::new(Gaussians::default());
         let asked = AssetRenderer::new(Arc::clone(&few), Backend::Cpu).unwrap().choice();
         assert!(asked.to_string().starts_with("cpu (") && asked.to_string().ends_with("): asked for"));

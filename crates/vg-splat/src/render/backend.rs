@@ -1,31 +1,31 @@
-//! What draws: the CPU's threads or a graphics processor.
+//! Rendering backends: the CPU's threads or a graphics processor.
 
 use super::{CpuRenderer, Differentiable};
 use serde::Serialize;
 use std::sync::Arc;
 use vg_geometry::{Error, Result};
 
-/// Who is asked to draw.
+/// The requested backend.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Backend {
-    /// A graphics processor where this build and this machine have one and the scene is worth it, else the CPU.
+    /// A graphics processor where this build and this machine have one and the scene is large enough, else the CPU.
     #[default]
     Auto,
-    /// The threads of the rayon pool it is called from.
+    /// The threads of the current rayon pool.
     Cpu,
-    /// A graphics processor, or a driver that stands in for one; an error without.
+    /// A graphics processor, or a driver that emulates one; an error without.
     Gpu,
 }
 
-/// What was chosen.
+/// The chosen backend.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Choice {
     /// [`Backend::Cpu`] or [`Backend::Gpu`].
     pub backend: Backend,
-    /// Instructions of the CPU, or the device's name.
+    /// Instruction set of the CPU, or the device's name.
     pub device: String,
-    /// Why; not a sentence.
+    /// The reason for the choice; not a sentence.
     pub why: String,
 }
 
@@ -41,20 +41,21 @@ pub fn is_built() -> bool {
     cfg!(feature = "gpu")
 }
 
-/// What is said where it cannot.
+/// The error where it cannot.
 pub fn not_built(argument: &str) -> Error {
     Error::NotBuilt {
         argument: argument.into(),
         found: "gpu".into(),
-        remedy: "build with the feature gpu, or draw with auto or cpu".into(),
+        remedy: "build with the feature gpu, or use auto or cpu".into(),
     }
 }
 
-/// A renderer, shared between threads, that can be differentiated.
+/// A differentiable renderer that threads can share.
 pub type Trainer = Arc<dyn Differentiable + Send + Sync>;
 
-/// Who draws Gaussians that are others in each picture, and goes back: for optimisation. [`Backend::Auto`] is the CPU,
-/// as the way back ends there and the Gaussians would have to be copied to the device for each picture.
+/// Chooses a differentiable renderer for optimisation, where the Gaussians change with every picture.
+/// [`Backend::Auto`] is the CPU, because the backward pass ends there and the Gaussians would have to be copied to the
+/// device for each picture.
 ///
 /// Errors, for [`Backend::Gpu`] alone: those of [`AssetRenderer::new`](super::AssetRenderer::new).
 pub fn trainer(backend: Backend) -> Result<(Trainer, Choice)> {
@@ -62,7 +63,7 @@ pub fn trainer(backend: Backend) -> Result<(Trainer, Choice)> {
         Backend::Gpu => device_trainer(),
         Backend::Auto | Backend::Cpu => {
             let cpu = CpuRenderer::new();
-            let why = if backend == Backend::Cpu { "asked for" } else { "the way back ends there" };
+            let why = if backend == Backend::Cpu { "asked for" } else { "the backward pass ends there" };
             let choice =
                 Choice { backend: Backend::Cpu, device: cpu.level().to_owned(), why: why.to_owned() };
             Ok((Arc::new(cpu), choice))

@@ -1,9 +1,9 @@
 //! Pictures of cameras with a lens: a finer pinhole picture that covers them, resampled along the lens's rays.
 //!
-//! The pinhole picture is drawn [`SUPERSAMPLING`] times finer with the blur scaled along, so that it is the same
-//! continuous picture, and is read bilinearly. Colour is read premultiplied by alpha, and depth as the accumulated
-//! sum of T alpha z, divided by the resampled alpha in the end: these sums are linear, so an interpolated pixel is
-//! what blending between its neighbours would have drawn, and empty neighbours do not pull its depth towards 0.
+//! The pinhole picture is drawn [`SUPERSAMPLING`] times finer with the blur scaled accordingly, so that it samples the
+//! same continuous picture, and is read bilinearly. Colour is read premultiplied by alpha, and depth as the accumulated
+//! sum of T alpha z, divided by the resampled alpha in the end. These sums are linear, so interpolation is exact
+//! between neighbouring pixels, and empty neighbours do not pull depth towards 0.
 
 use super::{
     Background, DepthMode, Differentiable, Gradients, PictureGradient, RenderOptions, Rendered, Renderer,
@@ -15,17 +15,17 @@ use vg_geometry::Result;
 use vg_geometry::camera::MAX_SIDE;
 use vg_geometry::resample::{Taps, pinhole_for};
 
-/// Pinhole pixels per pixel and axis. Interpolating at this spacing keeps the peak of the smallest splat, whose
-/// standard deviation is sqrt(0.3) pixels, to 10 %; its centroid and its sum exactly.
+/// Pinhole pixels per pixel and axis. Interpolation at this spacing preserves the peak of the smallest splat, whose
+/// standard deviation is sqrt(0.3) pixels, to 10 %, and its centroid and sum exactly.
 pub const SUPERSAMPLING: f64 = 2.0;
 
-/// Of a gradient's entries when it is scattered.
+/// Largest magnitude of a gradient's entries when it is scattered.
 const LARGEST: f32 = 1e34;
 
-/// Largest blur the options accept, pixels^2.
+/// Largest blur that the options accept, pixels^2.
 const MAX_BLUR: f32 = 100.0;
 
-/// Where each pixel of a distorted camera lies in the pinhole picture that is drawn for it.
+/// Position of each pixel of a distorted camera in its pinhole picture.
 #[derive(Clone, Debug)]
 pub(super) struct LensMap {
     source: Camera,
@@ -35,7 +35,7 @@ pub(super) struct LensMap {
 }
 
 impl LensMap {
-    /// For one lens; the pose is not looked at.
+    /// Builds the map of one lens; the camera's pose is ignored.
     pub(super) fn new(source: &Camera) -> Result<Self> {
         let cover = pinhole_for(source)?;
         let side = f64::from(cover.width.max(cover.height));
@@ -56,12 +56,12 @@ impl LensMap {
         Ok(Self { source: *source, pinhole, positions })
     }
 
-    /// Whether this map is of `camera`'s lens and size.
+    /// Whether this map fits the lens and size of `camera`.
     pub(super) fn fits(&self, camera: &Camera) -> bool {
         Camera { vehicle_from_camera: self.source.vehicle_from_camera, ..*camera } == self.source
     }
 
-    /// The picture of `camera`, whose lens this map is of.
+    /// Renders the picture of `camera`, which this map fits.
     pub(super) fn render(
         &self,
         renderer: &impl Renderer,
@@ -88,7 +88,7 @@ impl LensMap {
     /// The camera and options of the pinhole picture that is resampled.
     pub(super) fn pinhole(&self, camera: &Camera, options: &RenderOptions) -> (Camera, RenderOptions) {
         let pinhole = Camera { vehicle_from_camera: camera.vehicle_from_camera, ..self.pinhole };
-        // Focal lengths in pixels grew by this; a blur given in pixels^2 grows by its square.
+        // Focal lengths in pixels grow by this factor, the blur in pixels^2 by its square.
         let scale = pinhole.intrinsics.fx / camera.intrinsics.fx;
         let fine = RenderOptions {
             background: Background::Transparent,
@@ -99,7 +99,7 @@ impl LensMap {
         (pinhole, fine)
     }
 
-    /// The lens's picture of the pinhole picture `fine`.
+    /// Resamples the pinhole picture `fine` to the lens's picture.
     pub(super) fn resample(&self, fine: &Rendered, options: &RenderOptions, out: &mut Rendered) {
         let pixels = self.positions.len();
         (out.width, out.height) = (self.source.width, self.source.height);
@@ -123,25 +123,25 @@ impl LensMap {
         });
     }
 
-    /// A loss of the lens's picture as one of the pinhole picture `fine`, whose gradient it leaves in `of_fine`. Returns the
-    /// gradient of the background.
+    /// Evaluates a loss of the lens's picture and writes its gradient by the pinhole picture `fine` to `fine_gradient`.
+    /// Returns the gradient of the background.
     pub(super) fn loss(
         &self,
         options: &RenderOptions,
-        (fine, of_fine): (&Rendered, &mut PictureGradient),
-        (picture, of_picture): (&mut Rendered, &mut PictureGradient),
+        (fine, fine_gradient): (&Rendered, &mut PictureGradient),
+        (picture, picture_gradient): (&mut Rendered, &mut PictureGradient),
         loss: impl FnOnce(&Rendered, &mut PictureGradient) -> Result<f32>,
     ) -> Result<[f64; 3]> {
         self.resample(fine, options, picture);
-        loss(picture, of_picture)?;
-        of_fine.reset(fine);
-        Ok(self.scatter(picture, options, of_picture, of_fine))
+        loss(picture, picture_gradient)?;
+        fine_gradient.reset(fine);
+        Ok(self.scatter(picture, options, picture_gradient, fine_gradient))
     }
 
-    /// The adjoint of [`LensMap::resample`]: the gradient of the lens's picture scattered with the weights it was
-    /// read with. `picture` is the lens's. Returns the gradient of the background.
+    /// The adjoint of [`LensMap::resample`]: scatters the gradient of the lens's `picture` with the weights that it was
+    /// read with. Returns the gradient of the background.
     ///
-    /// One thread, in the order of the lens's pixels.
+    /// Runs on one thread, in the order of the lens's pixels.
     pub(super) fn scatter(
         &self,
         picture: &Rendered,
@@ -176,7 +176,7 @@ impl LensMap {
             if position[0].is_nan() {
                 continue;
             }
-            // A gradient near the end of f32 saturates: the sums of its neighbours stay finite.
+            // A gradient near the limit of f32 saturates, so that the sums of its neighbours stay finite.
             let (alpha, depth) = (alpha.clamp(-LARGEST, LARGEST), depth.clamp(-LARGEST, LARGEST));
             let color = color.map(|v| v.clamp(-LARGEST, LARGEST));
             let taps = Taps::new(*position, width, height);
@@ -192,7 +192,7 @@ impl LensMap {
     }
 }
 
-/// One picture of a camera with a lens, by a renderer that draws pinholes. A pixel without a ray, or whose ray
+/// Renders one picture of a camera with a lens, by a renderer of pinhole cameras. A pixel without a ray, or whose ray
 /// leaves the widest pinhole that is drawn, shows the background.
 pub fn render(
     renderer: &impl Renderer,
@@ -205,7 +205,7 @@ pub fn render(
     LensMap::new(camera)?.render(renderer, gaussians, camera, options)
 }
 
-/// Gradients through a lens, by a renderer that is differentiated for pinholes.
+/// Computes gradients through a lens, by a differentiable renderer of pinhole cameras.
 pub(super) fn backward(
     renderer: &impl Differentiable,
     gaussians: &Gaussians,
@@ -219,15 +219,15 @@ pub(super) fn backward(
     let map = LensMap::new(camera)?;
     let (pinhole, fine) = map.pinhole(camera, options);
     let fine_picture = renderer.render(gaussians, &pinhole, &fine)?;
-    let (mut picture, mut of_fine) = (Rendered::default(), PictureGradient::default());
+    let (mut picture, mut fine_gradient) = (Rendered::default(), PictureGradient::default());
     map.resample(&fine_picture, options, &mut picture);
-    of_fine.reset(&fine_picture);
-    let background = map.scatter(&picture, options, gradient, &mut of_fine);
-    let gradients = renderer.backward(gaussians, &pinhole, &fine, &of_fine)?;
+    fine_gradient.reset(&fine_picture);
+    let background = map.scatter(&picture, options, gradient, &mut fine_gradient);
+    let gradients = renderer.backward(gaussians, &pinhole, &fine, &fine_gradient)?;
     Ok(Gradients { background, ..gradients })
 }
 
-/// Premultiplied colour, alpha and accumulated depth, bilinear; edges repeated; nothing at NaN.
+/// Premultiplied colour, alpha and accumulated depth, interpolated bilinearly with repeated edges; zero at NaN.
 fn sample(picture: &Rendered, position: [f32; 2]) -> ([f32; 3], f32, f32) {
     if position[0].is_nan() {
         return ([0.0; 3], 0.0, 0.0);

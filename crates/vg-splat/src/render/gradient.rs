@@ -1,8 +1,9 @@
-//! What the backward pass takes and gives: gradients of a scalar loss, first of the picture, then of what made it.
+//! Input and output of the backward pass: gradients of a scalar loss by the picture, and by everything it is drawn
+//! from.
 //!
-//! Cuts are constants: the order of depth, the pixels a Gaussian reaches, alpha < 1/255, the stop at T <= 1e-4, near
-//! and far. Where a value is clamped its gradient is zero: alpha at `max_alpha`, colour at 0, the antialiased
-//! compensation at its floor, x/z and y/z of the projection's Jacobian outside the image and its margin.
+//! Discrete decisions are constants: the depth order, the pixels that a Gaussian reaches, alpha < 1/255, the stop at
+//! T <= 1e-4, near and far. Where a value is clamped its gradient is zero: alpha at `max_alpha`, colour at 0, the
+//! antialiased compensation at its floor, x/z and y/z of the projection's Jacobian outside the image and its margin.
 
 use crate::gaussians::Gaussians;
 use crate::render::{RenderOptions, Rendered, Renderer};
@@ -10,12 +11,12 @@ use glam::{DMat3, DQuat, DVec3};
 use vg_geometry::{Camera, Pose};
 use vg_geometry::{Error, Result};
 
-/// Gradient of a loss with respect to a picture's planes. A plane that is empty is one the loss does not look at.
+/// Gradient of a loss with respect to a picture's planes. An empty plane is one on which the loss does not depend.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PictureGradient {
-    /// Columns.
+    /// Width, pixels.
     pub width: u32,
-    /// Rows.
+    /// Height, pixels.
     pub height: u32,
     /// dL / d `Rendered::color`. `[height * width]` or empty
     pub color: Vec<[f32; 3]>,
@@ -25,36 +26,36 @@ pub struct PictureGradient {
     pub depth: Vec<f32>,
 }
 
-/// Gradient of a loss with respect to everything a picture is made of; the arrays are laid out as those of
-/// [`Gaussians`]. All numbers are finite: what f32 cannot hold is +-`f32::MAX`.
+/// Gradient of a loss with respect to everything that a picture is drawn from; the arrays are laid out as those of
+/// [`Gaussians`]. All numbers are finite: values beyond f32 become +-`f32::MAX`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Gradients {
-    /// Per metre. `[n][3]`
+    /// dL / d(mean), per metre. `[n][3]`
     pub means: Vec<[f32; 3]>,
-    /// Of the stored quaternion (w, x, y, z) as four free numbers that are normalised before use; it is
+    /// dL / d(quaternion) (w, x, y, z), as four free numbers that are normalised before use, so that it is
     /// perpendicular to the quaternion. `[n][4]`
     pub rotations: Vec<[f32; 4]>,
-    /// Of the standard deviations, per metre. `[n][3]`
+    /// dL / d(standard deviation), per metre. `[n][3]`
     pub scales: Vec<[f32; 3]>,
-    /// `[n]`
+    /// dL / d(opacity). `[n]`
     pub opacities: Vec<f32>,
-    /// Zero in bands above `RenderOptions::sh_degree`. `[n][(degree + 1)^2][3]`
+    /// dL / d(coefficient), zero in bands above `RenderOptions::sh_degree`. `[n][(degree + 1)^2][3]`
     pub sh: Vec<f32>,
-    /// Zero for a transparent background, which has no colour.
+    /// dL / d(background colour), zero for a transparent background.
     pub background: [f64; 3],
-    /// Of the camera.
+    /// Gradient of the camera's pose.
     pub pose: PoseGradient,
 }
 
 /// Gradient of a loss with respect to the camera's pose.
 ///
-/// [`moved`](PoseGradient::moved) says what the six numbers mean: the camera turns by `rotation` and moves by
-/// `translation`, both along its own axes (x right, y down, z forward).
+/// [`moved`](PoseGradient::moved) defines the six numbers: the camera turns by `rotation` and moves by `translation`,
+/// both along its own axes (x right, y down, z forward).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PoseGradient {
-    /// Per radian about the camera's axes.
+    /// Gradient per radian about the camera's axes.
     pub rotation: DVec3,
-    /// Per metre along the camera's axes.
+    /// Gradient per metre along the camera's axes.
     pub translation: DVec3,
     /// dL / d(entry) of `camera_from_vehicle = [R | t; 0 0 0 1]` with all entries free, row by row, where
     /// `p_camera = R p_vehicle + t` and colour is seen from the centre `-R^T t`; the last row is zero.
@@ -72,8 +73,8 @@ impl PoseGradient {
         }
     }
 
-    /// From sums over Gaussians: dL/dR of `p = R (m - c)` at fixed centre c, dL/dp, and the part of dL/dc that comes
-    /// through the directions colour is seen along.
+    /// Makes the gradient from sums over Gaussians: dL/dR of `p = R (m - c)` at fixed centre c, dL/dp, and the part of
+    /// dL/dc through the directions of colour.
     pub(crate) fn new(pose: &Pose, entries: DMat3, point: DVec3, center_of_directions: DVec3) -> Self {
         let r = pose.rotation.transpose();
         let c = pose.translation;
@@ -98,9 +99,9 @@ impl PoseGradient {
     }
 }
 
-/// A renderer that can be differentiated.
+/// A differentiable renderer.
 pub trait Differentiable: Renderer {
-    /// Gradients of the loss whose gradient with respect to the picture of these arguments is `gradient`.
+    /// Computes the gradients of the loss whose gradient with respect to the picture of these arguments is `gradient`.
     fn backward(
         &self,
         gaussians: &Gaussians,
@@ -109,29 +110,29 @@ pub trait Differentiable: Renderer {
         gradient: &PictureGradient,
     ) -> Result<Gradients>;
 
-    /// A picture and the gradients of a loss of it, into memory that is reused; what both need is done once where the
-    /// renderer can. `loss` adds to the gradient of the picture, which has its size and no plane yet; its error ends the
-    /// call. It is called once, or more often by a renderer that begins anew.
+    /// Renders a picture and computes the gradients of a loss of it, into memory that is reused; a renderer may share
+    /// work between the two. `loss` adds to the picture's gradient, which has its size and no plane yet; its error ends
+    /// the call. It is called once, or again by a renderer that starts over.
     ///
-    /// After an error the targets hold nothing in particular.
-    fn both_ways(
+    /// After an error the contents of the targets are unspecified.
+    fn forward_backward(
         &self,
         gaussians: &Gaussians,
         camera: &Camera,
         options: &RenderOptions,
-        (picture, of_picture, gradients): (&mut Rendered, &mut PictureGradient, &mut Gradients),
+        (picture, picture_gradient, gradients): (&mut Rendered, &mut PictureGradient, &mut Gradients),
         loss: &mut dyn FnMut(&Rendered, &mut PictureGradient) -> Result<()>,
     ) -> Result<()> {
         *picture = self.render(gaussians, camera, options)?;
-        of_picture.reset(picture);
-        loss(picture, of_picture)?;
-        *gradients = self.backward(gaussians, camera, options, of_picture)?;
+        picture_gradient.reset(picture);
+        loss(picture, picture_gradient)?;
+        *gradients = self.backward(gaussians, camera, options, picture_gradient)?;
         Ok(())
     }
 }
 
 impl PictureGradient {
-    /// Zero everywhere, of a picture's size, with every plane.
+    /// A gradient of zeros, of a picture's size, with every plane.
     pub fn zeros(width: u32, height: u32) -> Self {
         let pixels = width as usize * height as usize;
         Self {
@@ -143,7 +144,7 @@ impl PictureGradient {
         }
     }
 
-    /// Of the size of `picture` with no plane, keeping their memory: where a loss begins to add its terms.
+    /// Resizes to `picture` and empties all planes, keeping their memory, before a loss adds its terms.
     pub fn reset(&mut self, picture: &Rendered) {
         (self.width, self.height) = (picture.width, picture.height);
         self.color.clear();
@@ -151,32 +152,33 @@ impl PictureGradient {
         self.depth.clear();
     }
 
-    /// The gradient of colour to add to: zero where no term has added one yet.
+    /// The gradient of colour to add to; filled with zeros if the plane was empty.
     pub fn color_mut(&mut self) -> &mut [[f32; 3]] {
         self.color.resize(self.width as usize * self.height as usize, [0.0; 3]);
         &mut self.color
     }
 
-    /// As [`PictureGradient::color_mut`], of alpha.
+    /// The gradient of alpha, as [`PictureGradient::color_mut`].
     pub fn alpha_mut(&mut self) -> &mut [f32] {
         self.alpha.resize(self.width as usize * self.height as usize, 0.0);
         &mut self.alpha
     }
 
-    /// As [`PictureGradient::color_mut`], of depth.
+    /// The gradient of depth, as [`PictureGradient::color_mut`].
     pub fn depth_mut(&mut self) -> &mut [f32] {
         self.depth.resize(self.width as usize * self.height as usize, 0.0);
         &mut self.depth
     }
 
-    /// Adds the planes that are missing, of zeros.
+    /// Fills empty planes with zeros.
     pub(crate) fn add_planes(&mut self) {
         self.color_mut();
         self.alpha_mut();
         self.depth_mut();
     }
 
-    /// Planes of the camera's size or empty, of finite numbers; the largest magnitude in them.
+    /// Checks that the planes have the camera's size or are empty, and are finite. Returns the largest magnitude in
+    /// them.
     pub(crate) fn validate(&self, camera: &Camera) -> Result<f32> {
         let size = (camera.width, camera.height);
         if (self.width, self.height) != size {
@@ -194,7 +196,7 @@ impl PictureGradient {
     }
 }
 
-/// The largest magnitude in a plane, or an error that names the first pixel that is not finite.
+/// Returns the largest magnitude in a plane, or an error that names the first pixel that is not finite.
 fn largest(plane: &str, values: &[f32], channels: usize, pixels: usize) -> Result<f32> {
     if !values.is_empty() && values.len() != pixels * channels {
         return Err(Error::argument(
@@ -203,7 +205,7 @@ fn largest(plane: &str, values: &[f32], channels: usize, pixels: usize) -> Resul
             format!("{pixels}, one per pixel, or none"),
         ));
     }
-    // Magnitudes order like their bits, NaN above infinity: no branch per entry.
+    // Magnitudes order like their bits, with NaN above infinity, so no branch per entry is needed.
     let bits = values.iter().fold(0, |largest: u32, v| largest.max(v.abs().to_bits()));
     if f32::from_bits(bits).is_finite() {
         return Ok(f32::from_bits(bits));
@@ -217,7 +219,7 @@ fn largest(plane: &str, values: &[f32], channels: usize, pixels: usize) -> Resul
 }
 
 impl Gradients {
-    /// Sized for `gaussians`, keeping memory; what the arrays held stays where it is not written over.
+    /// Resizes the arrays for `gaussians`, keeping memory and old values.
     pub fn resize(&mut self, gaussians: &Gaussians) {
         let n = gaussians.len();
         self.means.resize(n, [0.0; 3]);
@@ -228,7 +230,7 @@ impl Gradients {
     }
 }
 
-/// f32 of a gradient: what it cannot hold is its largest number.
+/// Converts a gradient to f32, saturating at the largest finite number.
 #[inline(always)]
 pub(crate) fn narrow(v: f64) -> f32 {
     v.clamp(-f64::from(f32::MAX), f64::from(f32::MAX)) as f32

@@ -29,8 +29,8 @@ use crate::gaussians::Gaussians;
 use vg_geometry::Camera;
 use vg_geometry::Result;
 
-/// Draws Gaussians as a camera sees them.
+/// Renders Gaussians as a camera sees them.
 pub trait Renderer {
-    /// One picture. The camera may be distorted; it is validated.
+    /// Renders one picture. The camera may be distorted; it is validated.
     fn render(&self, gaussians: &Gaussians, camera: &Camera, options: &RenderOptions) -> Result<Rendered>;
 }

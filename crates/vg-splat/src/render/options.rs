@@ -1,56 +1,56 @@
-//! What may differ between two renders of the same Gaussians; the defaults are INRIA's and gsplat's.
+//! Render options; the defaults are those of INRIA and gsplat.
 
 use vg_geometry::{Error, Result};
 
-/// What is behind the vehicle.
+/// The background behind the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Background {
     /// A colour, RGB in [0, 1]; the picture is opaque.
     Color([f32; 3]),
-    /// Nothing: colour is premultiplied by the picture's own alpha.
+    /// No background: colour is premultiplied by the picture's own alpha.
     Transparent,
 }
 
-/// What a depth pixel means.
+/// The meaning of a depth pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DepthMode {
     /// Sum of T alpha z over alpha: metres, 0 where alpha is 0.
     Expected,
-    /// Sum of T alpha z, not divided (what the gradients are taken of).
+    /// Sum of T alpha z, not divided.
     Accumulated,
 }
 
-/// Render settings; `RenderOptions::default()` is what everything is measured with.
+/// Render options; `RenderOptions::default()` is used for all measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderOptions {
-    /// What shows where the vehicle does not.
+    /// The background behind the vehicle.
     pub background: Background,
     /// Variance added to each projected Gaussian, pixels^2.
     pub blur: f32,
     /// Compensate the opacity for the added variance (Mip-splatting's screen-space filter).
     pub antialiased: bool,
-    /// Gaussians nearer than this (their centre's z, metres) are not drawn.
+    /// Gaussians whose centre has a z below this, metres, are not drawn.
     pub near: f32,
-    /// Gaussians farther than this (their centre's z, metres) are not drawn.
+    /// Gaussians whose centre has a z above this, metres, are not drawn.
     pub far: f32,
-    /// Largest alpha one Gaussian may have in one pixel.
+    /// Largest alpha of one Gaussian in one pixel.
     pub max_alpha: f32,
-    /// SH bands above this are left out; more than the Gaussians have changes nothing.
+    /// Highest SH band used; values above the Gaussians' own degree change nothing.
     pub sh_degree: u8,
-    /// What `Rendered::depth` means.
+    /// The meaning of `Rendered::depth`.
     pub depth_mode: DepthMode,
 }
 
-/// An alpha below this is not drawn.
+/// Smallest alpha that is drawn.
 pub const ALPHA_THRESHOLD: f32 = 1.0 / 255.0;
 
-/// A pixel is finished, without the Gaussian at hand, where its transmittance would fall to this.
+/// A pixel is finished, without the current Gaussian, where its transmittance would fall to this.
 pub const TRANSMITTANCE_THRESHOLD: f32 = 1e-4;
 
 /// Floor of the antialiased opacity compensation.
 pub const MIN_COMPENSATION: f32 = 0.005;
 
-/// x/z and y/z are clamped to the image plus this part of its size before the Jacobian is taken.
+/// x/z and y/z are clamped to the image plus this fraction of its size before the Jacobian is taken.
 pub const PROJECTION_MARGIN: f32 = 0.15;
 
 impl Default for RenderOptions {
@@ -69,7 +69,7 @@ impl Default for RenderOptions {
 }
 
 impl RenderOptions {
-    /// Each field in its range.
+    /// Checks that each field is in its range.
     pub fn validate(&self) -> Result<()> {
         let check = |name: &str, value: f32, range: std::ops::RangeInclusive<f32>| {
             if range.contains(&value) {
@@ -86,7 +86,7 @@ impl RenderOptions {
                 check("background", value, 0.0..=1.0)?;
             }
         }
-        // Below 1e-4 px^2 a distant Gaussian could fall between pixel centres without a trace.
+        // Below 1e-4 px^2 a distant Gaussian could fall between pixel centres and vanish.
         check("blur", self.blur, 1e-4..=100.0)?;
         check("near", self.near, 1e-6..=1e10)?;
         check("far", self.far, self.near..=1e10)?;

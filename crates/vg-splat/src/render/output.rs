@@ -4,12 +4,12 @@ use super::{Background, RenderOptions};
 use rayon::prelude::*;
 use vg_geometry::Result;
 
-/// What a renderer draws; rows without gaps, row 0 at the top.
+/// A rendered picture; rows without gaps, row 0 at the top.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rendered {
-    /// Columns.
+    /// Width, pixels.
     pub width: u32,
-    /// Rows.
+    /// Height, pixels.
     pub height: u32,
     /// RGB, not clamped above 1. `[height * width]`
     pub color: Vec<[f32; 3]>,
@@ -20,12 +20,12 @@ pub struct Rendered {
 }
 
 impl Rendered {
-    /// RGB as 8-bit, rounded.
+    /// Converts to 8-bit RGB, rounded.
     pub fn to_rgb8(&self) -> Vec<[u8; 3]> {
         self.color.iter().map(|c| c.map(to_u8)).collect()
     }
 
-    /// RGBA as 8-bit with straight (not premultiplied) colour, for a render on a transparent background.
+    /// Converts to 8-bit RGBA with straight (not premultiplied) colour, for a render on a transparent background.
     pub fn to_rgba8(&self) -> Vec<[u8; 4]> {
         self.color.iter().zip(&self.alpha).map(straight).collect()
     }
@@ -36,7 +36,7 @@ fn straight((c, &a): (&[f32; 3], &f32)) -> [u8; 4] {
     [to_u8(c[0] * scale), to_u8(c[1] * scale), to_u8(c[2] * scale), to_u8(a)]
 }
 
-/// A picture of 8 bits, and the memory that it may be made in; reused from picture to picture.
+/// An 8-bit picture, with working memory that is reused from picture to picture.
 #[derive(Clone, Debug, Default)]
 pub struct Rgba8 {
     /// Red, green, blue and alpha, rounded; rows without gaps. Over a background alpha is 255; on a transparent one
@@ -46,7 +46,7 @@ pub struct Rgba8 {
 }
 
 impl Rgba8 {
-    /// Of the planes that `draw` makes.
+    /// Converts the planes that `draw` renders.
     pub(crate) fn make(
         &mut self,
         options: &RenderOptions,
@@ -67,8 +67,8 @@ impl Rgba8 {
     }
 }
 
-/// 8 bits of a value in [0, 1], rounded.
+/// Converts a value in [0, 1] to 8 bits, rounded.
 pub fn to_u8(v: f32) -> u8 {
-    // `as` saturates and sends NaN to 0.
+    // `as` saturates and converts NaN to 0.
     (v * 255.0).round() as u8
 }

@@ -1,4 +1,4 @@
-//! What a picture may be wanted as: planes or bytes.
+//! The two kinds of pictures: planes and bytes.
 
 use super::cpu::Watched;
 #[cfg(feature = "gpu")]
@@ -8,7 +8,7 @@ use crate::gaussians::Gaussians;
 use vg_geometry::Camera;
 use vg_geometry::Result;
 
-/// [`Rendered`], or [`Rgba8`], of which a device sends back a fifth. Not to be implemented elsewhere.
+/// [`Rendered`], or [`Rgba8`], which takes a fifth of the transfer from a device. Sealed.
 pub trait Picture: Default + inside::Drawn {}
 
 impl Picture for Rendered {}
@@ -17,7 +17,7 @@ impl Picture for Rgba8 {}
 pub(crate) mod inside {
     use super::*;
 
-    /// How renderers make it.
+    /// Drawing by each kind of renderer.
     pub trait Drawn {
         fn draw(
             &mut self,
@@ -36,7 +36,7 @@ pub(crate) mod inside {
             options: &RenderOptions,
         ) -> Result<()>;
 
-        /// Where a device's picture goes.
+        /// The target of a device's picture.
         #[cfg(feature = "gpu")]
         fn target(&mut self) -> Target<'_>;
     }

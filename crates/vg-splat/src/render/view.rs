@@ -1,9 +1,9 @@
-//! What every Gaussian is projected with: the camera and the options, made ready once per picture.
+//! The camera and options in the form the projection uses, prepared once per picture.
 
 use crate::render::options::{PROJECTION_MARGIN, RenderOptions};
 use vg_geometry::{Camera, Intrinsics};
 
-/// A pinhole camera in the form the projection uses; f64, so that a camera a million metres away costs nothing.
+/// A pinhole camera in the form the projection uses; f64, so that a camera a million metres away loses no precision.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PinholeView {
     /// Rows of `camera_from_vehicle`'s rotation.

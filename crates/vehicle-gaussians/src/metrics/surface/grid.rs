@@ -1,15 +1,15 @@
-//! One point a cell of a regular grid.
+//! Thinning of points to one per cell of a regular grid.
 
 use rayon::prelude::*;
 
-/// Bits of a cell's number along one axis.
+/// Bits of a cell's index along one axis.
 const BITS: u32 = 21;
 
 /// The mean of the points in each cell of side `cell`, in the order of cells; the grid begins at the origin.
 pub(super) fn thinned(points: &[[f32; 3]], cell: f64) -> Vec<[f32; 3]> {
     let key = |p: &[f32; 3]| {
         p.iter().fold(0u64, |key, c| {
-            // `as` saturates: what is 20 km away shares the last cell.
+            // `as` saturates: points beyond the last cell, kilometres away, share it.
             let half = 1i64 << (BITS - 1);
             let number = ((f64::from(*c) / cell).floor() as i64).clamp(-half, half - 1) + half;
             (key << BITS) | number as u64

@@ -1,10 +1,11 @@
 //! Error of a model's surface against a scan, metres: accuracy, completeness, Chamfer distance, F-score (Knapitsch et
 //! al. 2017, Tanks and Temples), and the error of its size.
 //!
-//! 1. The model's surface is what cameras outside and above see of it (`seen`), as a scanner would, not its centres.
-//! 2. Points of the scan that stand alone are taken out (`strays`): they are air.
-//! 3. On both sides one point a cell of a regular grid is left (`grid`): how densely a side is sampled counts nothing.
-//! 4. Each point's distance to the nearest of the other side, at most [`SurfaceOptions::reach_m`].
+//! 1. The model's surface is the part visible to cameras outside and above it (`seen`), as to a scanner, not its
+//!    centres.
+//! 2. Isolated points of the scan are removed (`strays`).
+//! 3. Both sides are thinned to one point per cell of a regular grid (`grid`), so sampling density does not matter.
+//! 4. Distances are taken from each point to the nearest of the other side, at most [`SurfaceOptions::reach_m`].
 //!
 //! Distances are from point to point: even a perfect model is about half the scan's spacing away from it.
 
@@ -24,14 +25,14 @@ use vg_splat::Gaussians;
 /// The distance below which a point counts as met, metres.
 pub const F_SCORE_M: f64 = 0.05;
 
-/// How a surface is compared with a scan; lengths in metres, 1e-3 to 1e3.
+/// Options of the comparison of a surface with a scan; lengths in metres, 1e-3 to 1e3.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceOptions {
     /// The distance below which a point counts as met.
     pub f_score_m: f64,
-    /// The largest distance that is counted: what is farther away is missing, no matter how far.
+    /// The largest distance counted; larger ones are cut to it, so a missing part counts as this far away.
     pub reach_m: f64,
-    /// Side of the cells of which one point is left.
+    /// Side of the grid's cells, of which each keeps one point.
     pub cell_m: f64,
 }
 
@@ -42,7 +43,7 @@ impl Default for SurfaceOptions {
 }
 
 impl SurfaceOptions {
-    /// Each field in its range.
+    /// Checks that each field is in its range.
     ///
     /// # Errors
     /// [`Error::Argument`] with the field's name.
@@ -58,46 +59,46 @@ impl SurfaceOptions {
     }
 }
 
-/// How far a model's surface is from a scan.
+/// Errors of a model's surface against a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SurfaceErrors {
     /// Mean distance from the model's surface to the scan, metres.
     pub accuracy_m: f64,
     /// Mean distance from the scan to the model's surface, metres.
     pub completeness_m: f64,
-    /// Mean of the two.
+    /// Mean of accuracy and completeness, metres.
     pub chamfer_m: f64,
     /// Share of the model's surface nearer to the scan than the threshold.
     pub precision: f64,
     /// Share of the scan nearer to the model's surface than the threshold.
     pub recall: f64,
-    /// Harmonic mean of the two.
+    /// Harmonic mean of precision and recall.
     pub f_score: f64,
-    /// How much longer (x) the model is than the scan, percent of the scan's length.
+    /// Excess of the model's length (x) over the scan's, percent of the scan's length.
     pub length_error_percent: f64,
-    /// The same of the width (y).
+    /// Excess of the model's width (y) over the scan's, percent of the scan's width.
     pub width_error_percent: f64,
-    /// The same of the height (z).
+    /// Excess of the model's height (z) over the scan's, percent of the scan's height.
     pub height_error_percent: f64,
 }
 
-/// Which part of the work is done when the model has been looked at from all around, by the time that it takes.
+/// Fraction of the work, in time, that is done once the visible surface has been rendered.
 const SEEN: f64 = 0.7;
 
-/// The share of points that may lie beyond either end of a side: strays so near to the vehicle that they were not
-/// known for strays. More would cut off mirrors.
+/// Fraction of points cut off at either end of an axis: strays so near to the vehicle that they were not recognised. A
+/// larger one would cut off mirrors.
 const BEYOND: f64 = 0.0005;
 
 impl SurfaceErrors {
-    /// Of a model against points measured on the vehicle, vehicle frame, metres.
+    /// The errors of a model against points measured on the vehicle, vehicle frame, metres, with default options.
     ///
     /// # Errors
-    /// A model of which nothing is seen, and whatever [`SurfaceErrors::between`] refuses.
+    /// The model has no visible surface; also those of [`SurfaceErrors::between`].
     pub fn of(gaussians: &Gaussians, scan: &[[f32; 3]]) -> Result<Self> {
         Self::with(gaussians, scan, &SurfaceOptions::default())
     }
 
-    /// The same with other lengths.
+    /// [`SurfaceErrors::of`] with the given options.
     ///
     /// # Errors
     /// As [`SurfaceErrors::of`].
@@ -105,7 +106,7 @@ impl SurfaceErrors {
         Self::watched(gaussians, scan, options, &UNWATCHED)
     }
 
-    /// The same under `watch`.
+    /// [`SurfaceErrors::with`] under `watch`.
     ///
     /// # Errors
     /// As [`SurfaceErrors::of`], and [`Error::Cancelled`].
@@ -122,10 +123,10 @@ impl SurfaceErrors {
         Self::compared(&model, scan, options, watch)
     }
 
-    /// Of points on one surface, which are all taken for the model's, against a scan, which may have strays.
+    /// The errors of points that all lie on the model's surface, against a scan, which may have strays.
     ///
     /// # Errors
-    /// A side without points, with too many for a [`Cloud`], or with one that is not finite; options out of range.
+    /// A side has no points, too many for a [`Cloud`], or one that is not finite; or an option is out of range.
     pub fn between(model: &[[f32; 3]], scan: &[[f32; 3]], options: &SurfaceOptions) -> Result<Self> {
         options.validate()?;
         Cloud::check("model", model)?;
@@ -133,7 +134,7 @@ impl SurfaceErrors {
         Self::compared(model, scan, options, &UNWATCHED)
     }
 
-    /// Of points and options that were checked.
+    /// The errors of checked points and options.
     fn compared(
         model: &[[f32; 3]],
         scan: &[[f32; 3]],
@@ -169,10 +170,10 @@ impl SurfaceErrors {
     }
 }
 
-/// What is seen of a model from outside and above, one point a cell of a regular grid, vehicle frame, metres.
+/// The surface of a model visible from outside and above, one point per cell of a regular grid, vehicle frame, metres.
 ///
 /// # Errors
-/// A model without Gaussians, or one of which nothing is seen.
+/// The model has no Gaussians or no visible surface.
 pub fn visible_surface(gaussians: &Gaussians, cell_m: f64) -> Result<Vec<[f32; 3]>> {
     surface(gaussians, cell_m, &UNWATCHED)
 }
@@ -182,14 +183,14 @@ fn surface(gaussians: &Gaussians, cell_m: f64, watch: &Watch) -> Result<Vec<[f32
     let points = grid::thinned(&seen::points(gaussians, cell_m, watch)?, cell_m);
     if points.is_empty() {
         let found = "nothing with an alpha of 0.5 from any side";
-        return Err(Error::argument("gaussians", found, "a surface that can be seen"));
+        return Err(Error::argument("gaussians", found, "a visible surface"));
     }
     Ok(points)
 }
 
-/// From each point to the nearest of the others, at most `reach`.
+/// Distance from each point to the nearest of the others, at most `reach`.
 fn distances(points: &[[f32; 3]], others: &[[f32; 3]], reach: f64, watch: &Watch) -> Vec<f64> {
-    let tree = Nearest::of_f32(others);
+    let tree = Nearest::from_f32(others);
     let distance = |p: &[f32; 3]| {
         if watch.is_stopped() {
             return reach;
@@ -207,7 +208,7 @@ fn share(distances: &[f64], below: f64) -> f64 {
     distances.iter().filter(|d| **d < below).count() as f64 / distances.len() as f64
 }
 
-/// Along each axis, from where [`BEYOND`] of the points lie before to where as many lie behind.
+/// Extent along each axis, without [`BEYOND`] of the points at either end.
 fn extents(points: &[[f32; 3]]) -> [f64; 3] {
     std::array::from_fn(|k| {
         let mut along: Vec<f32> = points.iter().map(|p| p[k]).collect();

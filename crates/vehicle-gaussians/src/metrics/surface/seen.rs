@@ -1,4 +1,4 @@
-//! What cameras outside and above see of a model: where its surface is, without what lies inside or below.
+//! Points on the surface of a model that is visible to cameras outside and above, without its inside and underside.
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -8,26 +8,26 @@ use vg_geometry::{Error, Result};
 use vg_splat::Gaussians;
 use vg_splat::render::{CpuRenderer, RenderOptions, Rendered, Renderer};
 
-/// Cameras at each elevation, degrees. None lower: a camera on the ground looks under the vehicle.
+/// Elevation of each ring of cameras, degrees, and its number of cameras. A lower camera would look under the vehicle.
 const RINGS: [(f64, u32); 3] = [(10.0, 8), (35.0, 8), (70.0, 4)];
 
-/// From the middle of the picture to its edge, degrees.
+/// Angle from the middle of the picture to its edge, degrees.
 const HALF_VIEW_DEGREES: f64 = 15.0;
 
-/// A pixel is a surface from here on.
+/// Alpha from which a pixel shows a surface.
 const ALPHA: f32 = 0.5;
 
-/// Where neighbouring pixels differ in depth by more than this many pixels' width there is an edge (or a surface seen
-/// at less than 11 degrees), and the depth is a mixture of what is before and behind it.
+/// Difference in depth between neighbouring pixels, in pixel widths, above which they lie at an edge (or on a surface
+/// seen at less than 11 degrees), where depth mixes foreground and background.
 const STEEP: f32 = 5.0;
 
-/// The share of centres that may lie beyond the box which the cameras look at, on each side.
+/// Fraction of centres that may lie outside the box in view, on each side.
 const BEYOND: f64 = 0.002;
 
-/// Pixels across a cell: every cell of a surface is hit by cameras that look at it at 40 degrees and less.
+/// Pixels across a cell: every cell of a surface is hit by cameras that see it at 40 degrees and less.
 const PIXELS: f64 = 1.3;
 
-/// Points on the surface, vehicle frame, metres, closer than `cell` where a camera looks at it squarely.
+/// Points on the surface, vehicle frame, metres, at a spacing below `cell` where a camera sees it frontally.
 pub(super) fn points(gaussians: &Gaussians, cell: f64, watch: &Watch) -> Result<Vec<[f32; 3]>> {
     if gaussians.is_empty() {
         return Err(Error::argument("gaussians", "none", "at least one"));
@@ -38,7 +38,7 @@ pub(super) fn points(gaussians: &Gaussians, cell: f64, watch: &Watch) -> Result<
     });
     let cameras: Result<Vec<Camera>> =
         cameras.map(|(elevation, azimuth)| camera(middle, radius, cell, elevation, azimuth)).collect();
-    // Colour is not looked at.
+    // Colour is not used.
     let options = RenderOptions { sh_degree: 0, ..RenderOptions::default() };
     let cpu = CpuRenderer::new();
     let renderer = cpu.watched(watch);
@@ -47,7 +47,7 @@ pub(super) fn points(gaussians: &Gaussians, cell: f64, watch: &Watch) -> Result<
     Ok(seen?.concat())
 }
 
-/// Around the box of the centres, but for a few that may lie anywhere.
+/// The ball around the box of the centres, except for a few outliers.
 fn ball(gaussians: &Gaussians) -> (DVec3, f64) {
     let side = |k: usize| {
         let mut along: Vec<f32> = gaussians.means().iter().map(|m| m[k]).collect();
@@ -67,7 +67,7 @@ fn ball(gaussians: &Gaussians) -> (DVec3, f64) {
     (0.5 * (low + high), (0.5 * (high - low).length() + 3.0 * size) * 1.02)
 }
 
-/// A square picture that just holds the ball.
+/// A camera whose square picture just contains the ball.
 fn camera(middle: DVec3, radius: f64, cell: f64, elevation: f64, azimuth: f64) -> Result<Camera> {
     let half_view = HALF_VIEW_DEGREES.to_radians();
     let pixels = (PIXELS * 2.0 * radius / cell).ceil().clamp(64.0, 1024.0);
@@ -83,11 +83,11 @@ fn camera(middle: DVec3, radius: f64, cell: f64, elevation: f64, azimuth: f64) -
     Camera::pinhole(pixels as u32, pixels as u32, intrinsics, pose)
 }
 
-/// The places of pixels that show a surface, not an edge.
+/// The points at pixels that show a surface, not an edge.
 fn lifted(drawn: &Rendered, camera: &Camera) -> Vec<[f32; 3]> {
     let (w, h) = (drawn.width as usize, drawn.height as usize);
     let steep = STEEP / camera.intrinsics.fx as f32;
-    // Blurred as pictures are, a surface shows one pixel beyond its edge: so the outermost goes.
+    // Blur extends a surface by one pixel beyond its edge, so the outermost pixel is left out.
     let is_smooth = |i: usize, other: usize| {
         drawn.alpha[other] >= ALPHA && (drawn.depth[other] - drawn.depth[i]).abs() <= steep * drawn.depth[i]
     };

@@ -1,19 +1,19 @@
-//! Points of a scan that stand alone: dust, reflections, what a scanner saw between two surfaces.
+//! Removal of isolated points of a scan: dust, reflections, mixed measurements between two surfaces.
 
 use glam::DVec3;
 use rayon::prelude::*;
 use vg_geometry::nearest::Nearest;
 use vg_geometry::progress::Watch;
 
-/// The neighbour whose distance says how lonely a point is: that many strays would have to stand together.
+/// The neighbour whose distance measures a point's isolation; a group of strays must be larger than this to be kept.
 const NEIGHBOUR: usize = 8;
 
-/// Times the middle distance: a surface scanned nine times as thinly as the middle of all stays.
+/// Limit in median distances: a surface scanned at a ninth of the median density is kept.
 const FACTOR: f64 = 3.0;
 
-/// Without the points whose eighth neighbour is more than three times as far as that of the middle of all.
+/// The points without those whose eighth neighbour is farther than three times the median of that distance.
 pub(super) fn removed(points: &[[f32; 3]], watch: &Watch) -> Vec<[f32; 3]> {
-    let tree = Nearest::of_f32(points);
+    let tree = Nearest::from_f32(points);
     let far = |p: &[f32; 3]| {
         if watch.is_stopped() {
             return 0.0;
@@ -38,7 +38,7 @@ mod tests {
     use vg_geometry::progress::UNWATCHED;
 
     #[test]
-    fn points_that_stand_alone_go_and_thin_surfaces_stay() {
+    fn isolated_points_are_removed_and_thin_surfaces_are_kept() {
         // A wall of 40 by 40 points 1 apart, one of 8 by 8 points 1.4 apart beside it, and five strays.
         let wall = (0..1600).map(|i| [(i % 40) as f32, (i / 40) as f32, 0.0]);
         let thin = (0..64).map(|i| [60.0 + 1.4 * (i % 8) as f32, 1.4 * (i / 8) as f32, 0.0]);
@@ -52,7 +52,7 @@ mod tests {
     }
 
     #[test]
-    fn few_points_and_points_in_one_place_stay() {
+    fn few_points_and_coincident_points_are_kept() {
         for points in [vec![], vec![[1.0; 3]], vec![[0.0; 3], [9.0; 3]], vec![[2.0; 3]; 100]] {
             assert_eq!(removed(&points, &UNWATCHED), points);
         }

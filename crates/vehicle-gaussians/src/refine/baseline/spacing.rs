@@ -10,7 +10,7 @@ const NEIGHBOURS: usize = 3;
 /// The root of the mean square distance to the three nearest others, for each point, in the points' unit; of fewer
 /// points to those there are, and 0 of one alone.
 pub(super) fn spacing(points: &[[f32; 3]]) -> Vec<f32> {
-    let tree = Nearest::of_f32(points);
+    let tree = Nearest::from_f32(points);
     let of = |(i, point): (usize, &[f32; 3])| {
         let mut near = tree.k_nearest(DVec3::from_array(point.map(f64::from)), NEIGHBOURS + 1);
         // The point itself, but for as many others in the same place.

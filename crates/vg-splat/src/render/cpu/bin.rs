@@ -1,19 +1,19 @@
-//! Which splats may touch which tile, nearest first, in bounded memory.
+//! Lists of the splats that may touch each tile, nearest first, in bounded memory.
 //!
-//! The image is cut into tiles, a row of tiles is a band. Depth order is cut into slices that make at most
-//! [`PAIR_BUDGET`] (tile, splat) pairs; one slice is the rule, and a picture of 1e6 Gaussians that each cover
-//! 8192 x 8192 pixels takes many, one after the other. Within a slice the bands are divided among stripes: every
-//! stripe scans the slice once to count and once to fill its own lists, so nothing is shared or merged.
+//! The image is cut into tiles; a row of tiles is a band. The depth order is cut into slices of at most [`PAIR_BUDGET`]
+//! (tile, splat) pairs. One slice is the normal case; a picture of 1e6 Gaussians that each cover 8192 x 8192 pixels
+//! takes many, one after the other. Within a slice the bands are divided among stripes: every stripe scans the slice
+//! once to count and once to fill its own lists, so nothing is shared or merged.
 
 use super::splat::PixelBounds;
 use super::tile::{BLOCK, TILE_HEIGHT, TILE_WIDTH};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Pairs held at a time: 128 MiB of entries.
+/// Maximum number of pairs held at a time: 128 MiB of entries.
 pub(super) const PAIR_BUDGET: u64 = 1 << 24;
 
-/// Tiles of an image.
+/// The tiles of an image.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
     pub(super) columns: usize,
@@ -40,8 +40,8 @@ impl Grid {
     }
 }
 
-/// One splat in one tile: its index, and the rows and blocks of the tile that it may touch. Splats behind a
-/// finished part of the picture are told by the entry alone, without fetching them from memory.
+/// One splat in one tile: its index, and the rows and blocks of the tile that it may touch. The entry alone is enough
+/// to skip splats behind a finished part of the picture, without fetching them from memory.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Entry(u64);
 
@@ -65,38 +65,40 @@ impl Entry {
         [self.0 as usize & 15, (self.0 >> 4) as usize & 15]
     }
 
-    /// One bit per block of a row.
+    /// The blocks of a row, one bit each.
     #[inline(always)]
     pub(super) fn blocks(self) -> u32 {
         (2u32 << ((self.0 >> 12) & 7)) - (1u32 << ((self.0 >> 8) & 7))
     }
 }
 
-/// Columns, then rows, of tiles that pixels lie in.
+/// Columns of tiles that contain the pixels.
 fn tile_columns(b: &PixelBounds) -> Range<usize> {
     usize::from(b.x0) / TILE_WIDTH..usize::from(b.x1) / TILE_WIDTH + 1
 }
 
-fn both(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
+fn intersection(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
     a.start.max(b.start)..a.end.min(b.end)
 }
 
+/// Rows of tiles that contain the pixels.
 fn tile_rows(b: &PixelBounds) -> Range<usize> {
     usize::from(b.y0) / TILE_HEIGHT..usize::from(b.y1) / TILE_HEIGHT + 1
 }
 
+/// Number of (tile, splat) pairs of one splat.
 fn pairs(b: &PixelBounds) -> u64 {
     (tile_columns(b).len() * tile_rows(b).len()) as u64
 }
 
-/// Consecutive bands with the list of each of their tiles.
+/// Consecutive bands with the lists of their tiles.
 #[derive(Debug, Default)]
 pub(super) struct Stripe {
     columns: Range<usize>,
     rows: Range<usize>,
-    /// Where each tile's list ends. `[rows * columns]`
-    ends: Vec<u32>,
-    /// Tile after tile, nearest first.
+    /// End of each tile's list in `entries`. `[rows * columns]`
+    end_from_tile: Vec<u32>,
+    /// Lists of all tiles, one after the other, nearest first.
     entries: Vec<Entry>,
 }
 
@@ -104,36 +106,36 @@ impl Stripe {
     /// The splats of the tile in column `column` of band `row` of the image, nearest first.
     pub(super) fn tile(&self, column: usize, row: usize) -> &[Entry] {
         let tile = (row - self.rows.start) * self.columns.len() + (column - self.columns.start);
-        let start = if tile == 0 { 0 } else { self.ends[tile - 1] };
-        &self.entries[start as usize..self.ends[tile] as usize]
+        let start = if tile == 0 { 0 } else { self.end_from_tile[tile - 1] };
+        &self.entries[start as usize..self.end_from_tile[tile] as usize]
     }
 
-    fn fill(&mut self, window: Window, order: &[u32], bounds: &[PixelBounds]) {
+    fn fill(&mut self, window: Window, splat_from_rank: &[u32], bounds: &[PixelBounds]) {
         let Window { columns, rows } = window;
         // Tile (row, column) is number `row * width + column - first`.
         let width = columns.len();
         let first = rows.start * width + columns.start;
-        self.ends.clear();
-        self.ends.resize(rows.len() * width, 0);
+        self.end_from_tile.clear();
+        self.end_from_tile.resize(rows.len() * width, 0);
         for b in bounds {
-            let own_columns = both(&tile_columns(b), &columns);
-            for row in both(&tile_rows(b), &rows) {
+            let own_columns = intersection(&tile_columns(b), &columns);
+            for row in intersection(&tile_rows(b), &rows) {
                 for column in own_columns.clone() {
-                    self.ends[row * width + column - first] += 1;
+                    self.end_from_tile[row * width + column - first] += 1;
                 }
             }
         }
-        // Starts now; filling moves each to its end.
+        // The counts become starts; filling moves each to its end.
         let mut total = 0;
-        for count in &mut self.ends {
+        for count in &mut self.end_from_tile {
             total += std::mem::replace(count, total);
         }
         self.entries.resize(total as usize, Entry::default());
-        for (b, &splat) in bounds.iter().zip(order) {
-            let own_columns = both(&tile_columns(b), &columns);
-            for row in both(&tile_rows(b), &rows) {
+        for (b, &splat) in bounds.iter().zip(splat_from_rank) {
+            let own_columns = intersection(&tile_columns(b), &columns);
+            for row in intersection(&tile_rows(b), &rows) {
                 for column in own_columns.clone() {
-                    let end = &mut self.ends[row * width + column - first];
+                    let end = &mut self.end_from_tile[row * width + column - first];
                     self.entries[*end as usize] =
                         Entry::new(splat, *b, column * TILE_WIDTH, row * TILE_HEIGHT);
                     *end += 1;
@@ -144,12 +146,16 @@ impl Stripe {
     }
 }
 
-/// The splats' bounds in depth order.
-pub(super) fn bounds_in_order(order: &[u32], bounds: &[PixelBounds], sorted: &mut Vec<PixelBounds>) {
-    order.par_iter().with_min_len(1 << 12).map(|&i| bounds[i as usize]).collect_into_vec(sorted);
+/// Sorts the splats' bounds by depth rank.
+pub(super) fn bounds_in_order(
+    splat_from_rank: &[u32],
+    bounds: &[PixelBounds],
+    sorted: &mut Vec<PixelBounds>,
+) {
+    splat_from_rank.par_iter().with_min_len(1 << 12).map(|&i| bounds[i as usize]).collect_into_vec(sorted);
 }
 
-/// How many of the nearest splats make at most `budget` pairs; at least one where there is one.
+/// Number of nearest splats that make at most `budget` pairs; at least one where there is one.
 pub(super) fn slice_len(bounds: &[PixelBounds], budget: u64) -> usize {
     let mut total = 0;
     let fitting = bounds.iter().position(|b| {
@@ -159,9 +165,9 @@ pub(super) fn slice_len(bounds: &[PixelBounds], budget: u64) -> usize {
     fitting.map_or(bounds.len(), |n| n.max(1))
 }
 
-/// Cuts the picture into windows of at most `budget` pairs each, or of one tile; row by row.
+/// Cuts the picture, row by row, into windows of at most `budget` pairs each, or of one tile.
 pub(super) fn windows(grid: Grid, bounds: &[PixelBounds], budget: u64) -> Vec<Window> {
-    // Pairs in each band: added where a splat begins, taken away after it ends.
+    // Pairs in each band: added where a splat begins, subtracted after it ends.
     let mut steps = vec![0i64; grid.rows + 1];
     for b in bounds {
         let (columns, rows) = (tile_columns(b).len() as i64, tile_rows(b));
@@ -175,7 +181,7 @@ pub(super) fn windows(grid: Grid, bounds: &[PixelBounds], budget: u64) -> Vec<Wi
         let pairs = in_band as u64;
         if pairs > budget {
             windows.extend(windows_of_band(grid, bounds, budget, row));
-            // Nothing may join it.
+            // No band may join this window.
             in_window = budget + 1;
         } else if let Some(last) = windows.last_mut().filter(|_| in_window + pairs <= budget) {
             last.rows.end = row + 1;
@@ -214,20 +220,25 @@ fn windows_of_band(grid: Grid, bounds: &[PixelBounds], budget: u64, row: usize) 
     windows
 }
 
-/// Bins one slice of the depth order, or one window of all of it; `stripes` is reused from picture to picture.
-pub(super) fn bin(window: &Window, order: &[u32], bounds: &[PixelBounds], stripes: &mut Vec<Stripe>) {
+/// Bins one slice of the depth order, or one window of the whole order; `stripes` is reused from picture to picture.
+pub(super) fn bin(
+    window: &Window,
+    splat_from_rank: &[u32],
+    bounds: &[PixelBounds],
+    stripes: &mut Vec<Stripe>,
+) {
     // Each stripe scans everything, so no more of them than there are threads.
     let rows = window.rows.len();
     let count = rayon::current_num_threads().clamp(1, rows);
     stripes.resize_with(count, Stripe::default);
     stripes.par_iter_mut().enumerate().for_each(|(i, stripe)| {
         let own = window.rows.start + i * rows / count..window.rows.start + (i + 1) * rows / count;
-        stripe.fill(Window { columns: window.columns.clone(), rows: own }, order, bounds);
+        stripe.fill(Window { columns: window.columns.clone(), rows: own }, splat_from_rank, bounds);
     });
 }
 
-/// The stripe that holds band `row`.
-pub(super) fn stripe_of(stripes: &[Stripe], row: usize) -> &Stripe {
+/// The stripe that contains band `row`.
+pub(super) fn stripe_with_row(stripes: &[Stripe], row: usize) -> &Stripe {
     let i = stripes.partition_point(|s| s.rows.end <= row);
     &stripes[i]
 }

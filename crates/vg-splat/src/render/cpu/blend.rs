@@ -1,9 +1,9 @@
-//! Front-to-back blending of one tile (method section 5): every splat walks the rows of its own ellipse.
+//! Front-to-back blending of one tile (method section 5): every splat visits the rows of its own ellipse.
 //!
 //! On a row at height dy the pixels with alpha >= 1/255 lie within
-//! `center_slope dy +- sqrt((q_max - row dy^2) inverse_column)` of the centre, the exponent completed to a square in
-//! x (see [`Splat`]). Only the blocks of eight pixels that this interval touches, and that
-//! still have an unfinished pixel, are evaluated: a car of 1 cm splats takes 25 times fewer than with 16 x 16 tiles.
+//! `center_slope dy +- sqrt((q_max - row dy^2) inverse_column)` of the centre, with the exponent completed to a square
+//! in x (see [`Splat`]). Only the blocks of eight pixels that this interval touches and that still have an unfinished
+//! pixel are evaluated: for a car of 1 cm splats, 25 times fewer than with 16 x 16 tiles.
 
 use super::bin::Entry;
 use super::simd::{self, Lanes};
@@ -12,29 +12,29 @@ use super::tile::{BLOCK, BLOCKS, Block, TILE_WIDTH, Tile};
 use crate::render::options::{ALPHA_THRESHOLD, TRANSMITTANCE_THRESHOLD};
 use pulp::f32x8;
 
-/// Splats fetched at a time: their cache misses overlap here, which they cannot while one is being blended.
+/// Splats fetched at a time, so that their cache misses overlap.
 const BATCH: usize = 32;
 
-/// Told of everything that is drawn, in order; the picture alone needs none of it.
+/// Receiver of everything that is drawn, in order, for the backward pass.
 pub(super) trait Record {
-    /// Whether the tile's colour is wanted; its transmittance and depth are there always.
+    /// Whether the tile's colour is computed; its transmittance and depth always are.
     const COLOR: bool;
 
-    /// Eight rows of a splat follow: at most 64 blocks.
+    /// Announces eight rows of a splat: at most 64 blocks.
     fn rows(&mut self);
 
-    /// Block `block` of the tile had transmittance `t` (negative: finished) before `alpha` was drawn on it, which
-    /// is 0 in lanes that drew nothing.
+    /// Records that block `block` of the tile had transmittance `t` (negative: finished) before `alpha` was drawn on
+    /// it, which is 0 in lanes that drew nothing.
     fn block<S: Lanes>(&mut self, simd: S, block: usize, alpha: f32x8, t: f32x8);
 
-    /// Splat number `splat` has been drawn.
+    /// Records that splat `splat` is complete.
     fn splat(&mut self, splat: usize);
 }
 
-/// Nothing is remembered.
-pub(super) struct Forget;
+/// Records nothing: the picture alone needs no record.
+pub(super) struct NoRecord;
 
-impl Record for Forget {
+impl Record for NoRecord {
     const COLOR: bool = true;
 
     #[inline(always)]
@@ -47,41 +47,41 @@ impl Record for Forget {
     fn splat(&mut self, _: usize) {}
 }
 
-/// Blends the splats that `list` names, nearest first, into the tile whose first pixel is `origin`.
+/// Blends the splats of `tile_entries`, nearest first, into the tile whose first pixel is `origin`.
 #[inline(always)]
 pub(super) fn blend<S: Lanes, R: Record>(
     simd: S,
     tile: &mut Tile,
     origin: [usize; 2],
-    list: &[Entry],
+    tile_entries: &[Entry],
     splats: &[Splat],
     max_alpha: f32,
     record: &mut R,
 ) {
     let x = block_centers(origin[0]);
-    let mut entries = [Entry::default(); BATCH];
-    let mut batch = [Splat::default(); BATCH];
-    for list in list.chunks(BATCH) {
+    let mut visible = [Entry::default(); BATCH];
+    let mut splat_from_visible = [Splat::default(); BATCH];
+    for batch in tile_entries.chunks(BATCH) {
         if !tile.is_live() {
             return;
         }
         let mut count = 0;
-        for &entry in list {
-            entries[count] = entry;
+        for &entry in batch {
+            visible[count] = entry;
             count += usize::from(is_visible(tile, entry));
         }
-        // Nothing here depends on what is fetched, so the misses overlap.
-        for (slot, entry) in batch.iter_mut().zip(&entries[..count]) {
-            *slot = splats[entry.splat()];
+        // The loop does not depend on the fetched values, so cache misses overlap.
+        for (splat, entry) in splat_from_visible.iter_mut().zip(&visible[..count]) {
+            *splat = splats[entry.splat()];
         }
-        for (entry, splat) in entries[..count].iter().zip(&batch) {
+        for (entry, splat) in visible[..count].iter().zip(&splat_from_visible) {
             blend_splat(simd, tile, origin, &x, *entry, splat, max_alpha, record);
             record.splat(entry.splat());
         }
     }
 }
 
-/// Whether a pixel that the splat may touch is not finished.
+/// Whether the splat may touch an unfinished pixel.
 #[inline(always)]
 fn is_visible(tile: &Tile, entry: Entry) -> bool {
     let [first, last] = entry.rows();
@@ -94,13 +94,13 @@ fn is_visible(tile: &Tile, entry: Entry) -> bool {
 
 /// The exponent on one row: -q = conditional t^2 + (along_x dx^2 + constant), t = slope_x dx + offset.
 struct Rows {
-    /// Blocks that the ellipse touches: byte r is row r, bit b of it block b.
+    /// Blocks that the ellipse touches: bit b of byte r is block b of row r.
     blocks: u64,
     offset: [f32; BLOCK],
     constant: [f32; BLOCK],
 }
 
-/// What `Rows` of one splat have in common.
+/// Coefficients shared by all [`Rows`] of one splat.
 struct Footprint {
     center: [f32x8; 2],
     center_rest: [f32x8; 2],
@@ -136,46 +136,47 @@ fn blend_splat<S: Lanes, R: Record>(
     let depth = simd.splat_f32s(splat.depth);
     let opacity = simd.splat_f32s(splat.opacity);
     let max_alpha = simd.splat_f32s(max_alpha);
-    // The same blocks in each of eight rows.
+    // The entry's blocks, repeated for each of eight rows.
     let columns = u64::from(entry.blocks()) * 0x0101_0101_0101_0101;
     for row in (first_row..=last_row).step_by(BLOCK) {
         record.rows();
         let rows = footprint.rows(simd, left, top + row);
         let mut live = [0; BLOCK];
         live.copy_from_slice(&tile.live[row..row + BLOCK]);
-        // One loop over all blocks of eight rows: its end is mispredicted once, not once a row.
+        // One loop over all blocks of eight rows: its end is mispredicted once, not once per row.
         let mut blocks = rows.blocks & columns & u64::from_le_bytes(live);
         while blocks != 0 {
-            let i = blocks.trailing_zeros() as usize;
+            let block_in_rows = blocks.trailing_zeros() as usize;
             blocks &= blocks - 1;
-            let (r, at) = (i / BLOCKS, i % BLOCKS);
-            let offset = simd.splat_f32s(rows.offset[r]);
-            let constant = simd.splat_f32s(rows.constant[r]);
-            let exponent = footprint.exponent(simd, x[at], offset, constant);
+            let block_in_tile = row * BLOCKS + block_in_rows;
+            let (row_in_rows, column) = (block_in_rows / BLOCKS, block_in_rows % BLOCKS);
+            let offset = simd.splat_f32s(rows.offset[row_in_rows]);
+            let constant = simd.splat_f32s(rows.constant[row_in_rows]);
+            let exponent = footprint.exponent(simd, x[column], offset, constant);
             let alpha = simd.mul_f32s(opacity, simd::exp2(simd, exponent));
             let alpha = simd.min_f32s(alpha, max_alpha);
-            let block = &mut tile.blocks[row * BLOCKS + i];
+            let block = &mut tile.blocks[block_in_tile];
             let t = block.transmittance;
             let drawn = composite::<S, R>(simd, block, alpha, color, depth);
-            record.block(simd, row * BLOCKS + i, drawn, t);
+            record.block(simd, block_in_tile, drawn, t);
             if simd.sign_bits(block.transmittance) == 0xff {
-                tile.live[row + r] &= !(1 << at);
+                tile.live[row + row_in_rows] &= !(1 << column);
             }
         }
     }
 }
 
-/// x of the pixel centres of each block of a tile that begins at column `left`.
+/// x coordinates of the pixel centres of each block of a tile that begins at column `left`.
 #[inline(always)]
 pub(super) fn block_centers(left: usize) -> [f32x8; BLOCKS] {
     let mut x = [pixel_centers(left); BLOCKS];
-    for (at, x) in x.iter_mut().enumerate() {
-        *x = pixel_centers(left + at * BLOCK);
+    for (column, x) in x.iter_mut().enumerate() {
+        *x = pixel_centers(left + column * BLOCK);
     }
     x
 }
 
-/// x of the centres of eight pixels.
+/// x coordinates of the centres of eight pixels.
 #[inline(always)]
 fn pixel_centers(left: usize) -> f32x8 {
     let x = left as f32 + 0.5;
@@ -204,20 +205,20 @@ impl Footprint {
         }
     }
 
-    /// Eight rows from image row `top` on, of a tile that begins at column `left`.
+    /// Evaluates eight rows from image row `top` on, of a tile that begins at column `left`.
     #[inline(always)]
     fn rows<S: Lanes>(&self, simd: S, left: usize, top: usize) -> Rows {
         let dy = simd.sub_f32s(simd.sub_f32s(pixel_centers(top), self.center[1]), self.center_rest[1]);
         let dy2 = simd.mul_f32s(dy, dy);
         let zero = simd.splat_f32s(0.0);
 
-        // Interval of x in tile pixels, a pixel centre at x covering [x, x + 1) of block arithmetic.
+        // Interval of x in tile pixels; a pixel centre at x covers [x, x + 1) in block arithmetic.
         let rest = simd.sub_f32s(self.q_max, simd.mul_f32s(self.row, dy2));
         let half = simd.sqrt_f32s(simd.mul_f32s(simd.max_f32s(rest, zero), self.inverse_column));
         let center = simd.sub_f32s(self.center[0], simd.splat_f32s(left as f32 + 0.5));
         let center = simd.add_f32s(center, self.center_rest[0]);
         let center = simd.mul_add(self.center_slope, dy, center);
-        // Rounding of the lines above, generously; what it lets in is cut at alpha < 1/255.
+        // A generous bound of the rounding above; excess pixels are rejected by alpha < 1/255.
         let magnitude = simd.add_f32s(simd.max_f32s(center, simd.sub_f32s(zero, center)), half);
         let slack = simd.mul_add(magnitude, simd.splat_f32s(1e-6), simd.splat_f32s(0.01));
         let half = simd.add_f32s(half, slack);
@@ -233,7 +234,7 @@ impl Footprint {
         );
         let low = simd.max_f32s(low, zero);
         let high = simd.min_f32s(high, last);
-        // Bits first..=last of a block mask.
+        // Bits `low / 8` to `high / 8` of a block mask.
         let two = simd.wrapping_dyn_shl_u32s(simd.splat_u32s(2), block_of(simd, high));
         let one = simd.wrapping_dyn_shl_u32s(simd.splat_u32s(1), block_of(simd, low));
         let blocks = simd.select_u32s(touched, simd.sub_u32s(two, one), simd.splat_u32s(0));
@@ -264,7 +265,7 @@ fn block_of<S: Lanes>(simd: S, x: f32x8) -> pulp::u32x8 {
     simd.and_u32s(simd.transmute_u32s_f32s(rounded), simd.splat_u32s(BLOCKS as u32 - 1))
 }
 
-/// C += T alpha colour, D += T alpha z, T *= 1 - alpha where alpha counts and the pixel is not finished by it.
+/// C += T alpha colour, D += T alpha z, T *= 1 - alpha where alpha is large enough and does not finish the pixel.
 /// Returns alpha where it was drawn, else 0.
 #[inline(always)]
 fn composite<S: Lanes, R: Record>(
@@ -276,14 +277,14 @@ fn composite<S: Lanes, R: Record>(
 ) -> f32x8 {
     let t = block.transmittance;
     let next = simd.mul_f32s(t, simd.sub_f32s(simd.splat_f32s(1.0), alpha));
-    // False for a NaN, which a form that has overflowed may give.
+    // False for NaN, which an overflowed exponent may produce.
     let counts = simd.greater_than_or_equal_f32s(alpha, simd.splat_f32s(ALPHA_THRESHOLD));
     // A finished pixel's transmittance is negative, so its next one is too.
     let open = simd.greater_than_f32s(next, simd.splat_f32s(TRANSMITTANCE_THRESHOLD));
     let drawn = simd.and_m32s(counts, open);
 
-    // What T lost, where the picture is drawn: that sums up to the 1 - T by which depth is divided, and T alpha does so but
-    // for rounding.
+    // For the picture the weight is the decrease of T: it sums exactly to the 1 - T by which depth is divided, T alpha
+    // only up to rounding.
     let weight = if R::COLOR { simd.sub_f32s(t, next) } else { simd.mul_f32s(t, alpha) };
     let weight = simd.select_f32s(drawn, weight, simd.splat_f32s(0.0));
     if R::COLOR {

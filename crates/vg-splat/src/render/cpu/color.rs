@@ -1,6 +1,6 @@
 //! Colour from spherical harmonics in f32: `max(0, 0.5 + sum_k sh_k Y_k(d))`.
 
-/// Colours are cut here, so that sums over a pixel stay finite whatever the coefficients are.
+/// Upper clamp of colours, so that sums over a pixel stay finite whatever the coefficients are.
 const MAX_COLOR: f32 = 1e30;
 
 /// All sixteen basis functions at the unit direction (x, y, z), in 3DGS's order and signs.
@@ -30,11 +30,11 @@ pub(super) fn basis(x: f32, y: f32, z: f32) -> [f32; 16] {
     ]
 }
 
-/// Colour of one Gaussian: `sh` `[>= coefficients][3]`, of which the first `coefficients` are used.
+/// Colour of one Gaussian from the first `coefficients` of `sh` `[>= coefficients][3]`.
 #[inline(always)]
 pub(super) fn color(sh: &[f32], basis: &[f32; 16], coefficients: usize) -> [f32; 3] {
-    // Four lanes per coefficient: the three channels and, before them, the last float of the coefficient ahead,
-    // which is computed and ignored. So no load reaches past the end of the array.
+    // Four lanes per coefficient: the three channels and, before them, the last float of the previous coefficient,
+    // which is computed and ignored. No load reaches past the end of the array.
     let mut sum = [0.0f32; 4];
     for k in 1..coefficients {
         let four = &sh[3 * k - 1..3 * k + 3];
@@ -51,7 +51,7 @@ pub(super) fn color(sh: &[f32], basis: &[f32; 16], coefficients: usize) -> [f32;
     rgb
 }
 
-/// Whether each channel moves with its coefficients: not at 0 and not at [`MAX_COLOR`], where it is cut.
+/// Whether each channel varies with its coefficients: not at 0 and not at [`MAX_COLOR`], where it is clamped.
 #[inline(always)]
 pub(super) fn moves(color: [f32; 3]) -> [bool; 3] {
     color.map(|v| v > 0.0 && v < MAX_COLOR)
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn coefficients_near_the_end_of_f32_give_finite_colours() {
+    fn coefficients_near_the_limit_of_f32_give_finite_colours() {
         let coefficients: Vec<f32> = (0..48).map(|i| if i % 2 == 0 { f32::MAX } else { f32::MIN }).collect();
         let found = color(&coefficients, &basis(0.6, 0.0, 0.8), 16);
         assert!(found.iter().all(|c| (0.0..=MAX_COLOR).contains(c)), "{found:?}");

@@ -1,4 +1,4 @@
-//! Pictures with their gradients: one projection, one sort and one set of lists for both directions.
+//! Pictures with their gradients: the forward and backward pass share one projection, one sort and one set of lists.
 
 use super::backward::{self, BackwardTimes};
 use super::simd::Lanes;
@@ -15,15 +15,15 @@ use vg_geometry::progress::{UNWATCHED, Watch};
 pub struct GradientTimes {
     /// Drawing the picture.
     pub forward: StageTimes,
-    /// The loss, and checking its gradient.
+    /// Evaluating the loss, and checking its gradient.
     pub loss: Duration,
-    /// Going back.
+    /// The backward pass.
     pub backward: BackwardTimes,
 }
 
 impl CpuRenderer {
-    /// A picture, and the gradients of a loss of it. `loss` looks at the picture and returns the loss's gradient
-    /// with respect to it, all of finite numbers; an error of its own ends the call.
+    /// Renders a picture and computes the gradients of a loss of it. `loss` returns the loss's gradient with respect to
+    /// the picture, which must be finite; an error of its own ends the call.
     pub fn render_with_gradients(
         &self,
         gaussians: &Gaussians,
@@ -32,36 +32,37 @@ impl CpuRenderer {
         loss: impl FnOnce(&Rendered) -> Result<PictureGradient>,
     ) -> Result<(Rendered, Gradients)> {
         let (mut picture, mut gradients) = (Rendered::default(), Gradients::default());
-        let mut of_picture = PictureGradient::default();
+        let mut picture_gradient = PictureGradient::default();
         let loss = |picture: &Rendered, gradient: &mut PictureGradient| {
             *gradient = loss(picture)?;
             Ok(())
         };
-        let targets = (&mut picture, &mut of_picture, &mut gradients);
+        let targets = (&mut picture, &mut picture_gradient, &mut gradients);
         self.render_with_gradients_into(gaussians, camera, options, targets, loss)?;
         Ok((picture, gradients))
     }
 
     /// As [`CpuRenderer::render_with_gradients`], into memory that is reused. `loss` adds to the gradient of the
-    /// picture, which has its size and no plane yet. The times are of a pinhole camera's stages, and zero through a lens.
+    /// picture, which has its size and no plane yet. The times are those of a pinhole camera's stages, and zero through
+    /// a lens.
     ///
-    /// After an error the targets hold nothing in particular.
+    /// After an error the contents of the targets are unspecified.
     pub fn render_with_gradients_into(
         &self,
         gaussians: &Gaussians,
         camera: &Camera,
         options: &RenderOptions,
-        (picture, of_picture, gradients): (&mut Rendered, &mut PictureGradient, &mut Gradients),
+        (picture, picture_gradient, gradients): (&mut Rendered, &mut PictureGradient, &mut Gradients),
         loss: impl FnOnce(&Rendered, &mut PictureGradient) -> Result<()>,
     ) -> Result<GradientTimes> {
-        let targets = (picture, of_picture, gradients);
-        self.watched(&UNWATCHED).both_ways_with(gaussians, camera, options, targets, loss)
+        let targets = (picture, picture_gradient, gradients);
+        self.watched(&UNWATCHED).forward_backward_with(gaussians, camera, options, targets, loss)
     }
 
-    /// The way back from what pixels have for each Gaussian, where they were drawn and summed up elsewhere; the
-    /// camera is valid and has no lens.
+    /// Continues the backward pass from the pixels' sums for each Gaussian, computed elsewhere; the camera is valid and
+    /// has no lens.
     #[cfg(feature = "gpu")]
-    pub(in crate::render) fn back_to_gaussians(
+    pub(in crate::render) fn backward_to_gaussians(
         &self,
         gaussians: &Gaussians,
         camera: &Camera,
@@ -73,10 +74,10 @@ impl CpuRenderer {
         match self.level {
             #[cfg(target_arch = "x86_64")]
             Level::Avx2(simd) => {
-                backward::back_to_gaussians(simd, gaussians, camera, options, shares, decided, out);
+                backward::backward_to_gaussians(simd, gaussians, camera, options, shares, decided, out);
             }
             Level::Portable(simd) => {
-                backward::back_to_gaussians(simd, gaussians, camera, options, shares, decided, out);
+                backward::backward_to_gaussians(simd, gaussians, camera, options, shares, decided, out);
             }
         }
     }
@@ -84,41 +85,42 @@ impl CpuRenderer {
 
 impl Watched<'_> {
     /// See [`CpuRenderer::render_with_gradients_into`].
-    fn both_ways_with(
+    fn forward_backward_with(
         &self,
         gaussians: &Gaussians,
         camera: &Camera,
         options: &RenderOptions,
-        (picture, of_picture, gradients): (&mut Rendered, &mut PictureGradient, &mut Gradients),
+        (picture, picture_gradient, gradients): (&mut Rendered, &mut PictureGradient, &mut Gradients),
         loss: impl FnOnce(&Rendered, &mut PictureGradient) -> Result<()>,
     ) -> Result<GradientTimes> {
         camera.validate("camera")?;
         options.validate()?;
-        let largest = |picture: &Rendered, of_picture: &mut PictureGradient| {
-            of_picture.reset(picture);
-            loss(picture, of_picture)?;
-            of_picture.validate(camera)
+        let largest = |picture: &Rendered, picture_gradient: &mut PictureGradient| {
+            picture_gradient.reset(picture);
+            loss(picture, picture_gradient)?;
+            picture_gradient.validate(camera)
         };
         if camera.distortion.is_none() {
-            let targets = (picture, of_picture, gradients);
-            return self.pinhole_both_ways(gaussians, camera, options, targets, largest);
+            let targets = (picture, picture_gradient, gradients);
+            return self.pinhole_forward_backward(gaussians, camera, options, targets, largest);
         }
         let map = self.renderer.lens_map(camera)?;
         let (pinhole, fine) = map.pinhole(camera, options);
-        let (mut fine_picture, mut of_fine) = (Rendered::default(), PictureGradient::default());
+        let (mut fine_picture, mut fine_gradient) = (Rendered::default(), PictureGradient::default());
         let mut background = [0.0; 3];
-        let through_lens = |fine: &Rendered, of_fine: &mut PictureGradient| {
-            background = map.loss(options, (fine, &mut *of_fine), (picture, of_picture), largest)?;
-            of_fine.validate(&pinhole)
+        let through_lens = |fine: &Rendered, fine_gradient: &mut PictureGradient| {
+            background =
+                map.loss(options, (fine, &mut *fine_gradient), (picture, picture_gradient), largest)?;
+            fine_gradient.validate(&pinhole)
         };
-        let targets = (&mut fine_picture, &mut of_fine, &mut *gradients);
-        self.pinhole_both_ways(gaussians, &pinhole, &fine, targets, through_lens)?;
+        let targets = (&mut fine_picture, &mut fine_gradient, &mut *gradients);
+        self.pinhole_forward_backward(gaussians, &pinhole, &fine, targets, through_lens)?;
         gradients.background = background;
         Ok(GradientTimes::default())
     }
 
-    /// Of a valid camera without a lens; `loss` as in [`both_ways`].
-    fn pinhole_both_ways(
+    /// Forward and backward pass of a valid camera without a lens; `loss` as in [`forward_backward`].
+    fn pinhole_forward_backward(
         &self,
         gaussians: &Gaussians,
         camera: &Camera,
@@ -132,10 +134,10 @@ impl Watched<'_> {
         let times = match renderer.level {
             #[cfg(target_arch = "x86_64")]
             Level::Avx2(simd) => {
-                both_ways(simd, gaussians, camera, options, budget, watch, &mut scratch, targets, loss)
+                forward_backward(simd, gaussians, camera, options, budget, watch, &mut scratch, targets, loss)
             }
             Level::Portable(simd) => {
-                both_ways(simd, gaussians, camera, options, budget, watch, &mut scratch, targets, loss)
+                forward_backward(simd, gaussians, camera, options, budget, watch, &mut scratch, targets, loss)
             }
         };
         renderer.pool().push(scratch);
@@ -144,8 +146,9 @@ impl Watched<'_> {
     }
 }
 
-/// `loss` fills the gradient of the picture and returns its largest magnitude.
-fn both_ways<S: Lanes>(
+/// Renders a picture and computes its gradients. `loss` fills the gradient of the picture and returns its largest
+/// magnitude.
+fn forward_backward<S: Lanes>(
     simd: S,
     gaussians: &Gaussians,
     camera: &Camera,
@@ -153,18 +156,18 @@ fn both_ways<S: Lanes>(
     pair_budget: u64,
     watch: &Watch,
     scratch: &mut Scratch,
-    (picture, of_picture, gradients): (&mut Rendered, &mut PictureGradient, &mut Gradients),
+    (picture, picture_gradient, gradients): (&mut Rendered, &mut PictureGradient, &mut Gradients),
     loss: impl FnOnce(&Rendered, &mut PictureGradient) -> Result<f32>,
 ) -> Result<GradientTimes> {
     let mut forward = super::prepare(simd, gaussians, camera, options, watch, scratch);
     let binned =
         super::blend_in_slices(simd, camera, options, pair_budget, watch, scratch, picture, &mut forward);
-    // The caller's function must not see a part of a picture.
+    // The caller's function must not get an incomplete picture.
     watch.check()?;
     let start = Instant::now();
-    let largest = loss(picture, of_picture)?;
+    let largest = loss(picture, picture_gradient)?;
     let loss = start.elapsed();
-    let given = (&*of_picture, largest);
+    let given = (&*picture_gradient, largest);
     let budget = pair_budget;
     let backward = backward::backward(
         simd, gaussians, camera, options, budget, watch, scratch, binned, given, gradients,
@@ -183,7 +186,7 @@ impl Differentiable for CpuRenderer {
         self.watched(&UNWATCHED).backward(gaussians, camera, options, gradient)
     }
 
-    fn both_ways(
+    fn forward_backward(
         &self,
         gaussians: &Gaussians,
         camera: &Camera,
@@ -208,14 +211,14 @@ impl Differentiable for Watched<'_> {
         let largest = gradient.validate(camera)?;
         let mut out = Gradients::default();
         if !camera.distortion.is_none() {
-            // Resampling needs the picture anyway.
-            let (mut picture, mut of_picture) = (Rendered::default(), PictureGradient::default());
-            let targets = (&mut picture, &mut of_picture, &mut out);
-            let loss = |_: &Rendered, of_picture: &mut PictureGradient| {
-                of_picture.clone_from(gradient);
+            // Resampling needs the picture in any case.
+            let (mut picture, mut picture_gradient) = (Rendered::default(), PictureGradient::default());
+            let targets = (&mut picture, &mut picture_gradient, &mut out);
+            let loss = |_: &Rendered, picture_gradient: &mut PictureGradient| {
+                picture_gradient.clone_from(gradient);
                 Ok(())
             };
-            self.both_ways_with(gaussians, camera, options, targets, loss)?;
+            self.forward_backward_with(gaussians, camera, options, targets, loss)?;
             return Ok(out);
         }
         let Self { renderer, watch } = *self;
@@ -224,10 +227,10 @@ impl Differentiable for Watched<'_> {
         match renderer.level {
             #[cfg(target_arch = "x86_64")]
             Level::Avx2(simd) => {
-                back(simd, gaussians, camera, options, budget, watch, &mut scratch, given, &mut out);
+                backward_only(simd, gaussians, camera, options, budget, watch, &mut scratch, given, &mut out);
             }
             Level::Portable(simd) => {
-                back(simd, gaussians, camera, options, budget, watch, &mut scratch, given, &mut out);
+                backward_only(simd, gaussians, camera, options, budget, watch, &mut scratch, given, &mut out);
             }
         }
         renderer.pool().push(scratch);
@@ -235,7 +238,7 @@ impl Differentiable for Watched<'_> {
         Ok(out)
     }
 
-    fn both_ways(
+    fn forward_backward(
         &self,
         gaussians: &Gaussians,
         camera: &Camera,
@@ -243,12 +246,12 @@ impl Differentiable for Watched<'_> {
         targets: (&mut Rendered, &mut PictureGradient, &mut Gradients),
         loss: &mut dyn FnMut(&Rendered, &mut PictureGradient) -> Result<()>,
     ) -> Result<()> {
-        self.both_ways_with(gaussians, camera, options, targets, loss).map(drop)
+        self.forward_backward_with(gaussians, camera, options, targets, loss).map(drop)
     }
 }
 
-/// Without drawing the picture first.
-fn back<S: Lanes>(
+/// Computes the gradients without drawing the picture first.
+fn backward_only<S: Lanes>(
     simd: S,
     gaussians: &Gaussians,
     camera: &Camera,

@@ -1,8 +1,8 @@
 //! The fast renderer: f32 blending on the processor's vectors, rows of ellipses instead of tiles of pixels.
 //!
 //! Stages, in order: `project` (f64, eight Gaussians at a time), `sort` (depth bits), `bin` (which tile), `blend`.
-//! It runs in the rayon pool it is called from and draws the same bytes with any number of threads.
-//! `docs/RENDERER.md` has the measurements behind each choice.
+//! It runs in the current rayon pool and draws the same bytes with any number of threads. `docs/RENDERER.md` has the
+//! measurements behind each choice.
 
 pub(super) mod backward;
 mod bin;
@@ -23,7 +23,7 @@ use crate::render::{RenderOptions, Rendered, Renderer};
 use backward::BackwardScratch;
 pub use backward::BackwardTimes;
 use bin::{Grid, Stripe};
-use blend::Forget;
+use blend::NoRecord;
 pub use gradients::GradientTimes;
 use rayon::prelude::*;
 use simd::Lanes;
@@ -36,10 +36,10 @@ use vg_geometry::Result;
 use vg_geometry::progress::{UNWATCHED, Watch};
 pub use watched::Watched;
 
-/// Gaussians projected by one task: large enough to hide its cost, small enough to keep threads evenly busy.
+/// Gaussians projected by one task: enough to hide its overhead, few enough to keep threads evenly busy.
 const PROJECT_CHUNK: usize = 2048;
 
-/// Which instructions the kernels are compiled for.
+/// Instruction set for which the kernels are compiled.
 #[derive(Clone, Copy, Debug)]
 enum Level {
     #[cfg(target_arch = "x86_64")]
@@ -47,41 +47,43 @@ enum Level {
     Portable(pulp::Scalar256b),
 }
 
-/// Draws on the CPU. Keeps its working memory from picture to picture; may be shared between threads.
+/// Renderer on the CPU. It keeps its working memory from picture to picture and can be shared between threads.
 #[derive(Debug)]
 pub struct CpuRenderer {
     level: Level,
     /// See `bin::PAIR_BUDGET`; tests lower it.
     pair_budget: u64,
     scratch: Mutex<Vec<Scratch>>,
-    /// Of the last lens drawn: inverting it takes longer than drawing.
+    /// Map of the last lens drawn: computing it takes longer than drawing.
     lens: Mutex<Option<Arc<LensMap>>>,
 }
 
 /// Wall time of each stage of one picture.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StageTimes {
-    /// Gaussians to splats, with their colours.
+    /// Projecting Gaussians to splats, with their colours.
     pub project: Duration,
-    /// Depth order.
+    /// Sorting by depth.
     pub sort: Duration,
-    /// Lists of splats per tile.
+    /// Listing the splats of each tile.
     pub bin: Duration,
     /// Blending, and writing the picture.
     pub blend: Duration,
 }
 
-/// Arrays that outlive a picture.
+/// Working memory, reused from picture to picture.
 #[derive(Debug, Default)]
 struct Scratch {
     splats: Vec<Splat>,
     keys: Vec<u32>,
+    /// Bounds of each splat. `[n]`
     pixel_bounds: Vec<PixelBounds>,
     entries: Vec<u64>,
     entries_other: Vec<u64>,
-    order: Vec<u32>,
-    /// In depth order.
-    bounds: Vec<PixelBounds>,
+    /// Index of the splat at each rank of the depth order. `[drawn]`
+    splat_from_rank: Vec<u32>,
+    /// Bounds of the splat at each rank of the depth order. `[drawn]`
+    bounds_from_rank: Vec<PixelBounds>,
     stripes: Vec<Stripe>,
     backward: BackwardScratch,
 }
@@ -93,7 +95,7 @@ impl Default for CpuRenderer {
 }
 
 impl CpuRenderer {
-    /// With the widest vectors that pay on this processor: AVX2 and FMA where it has them.
+    /// A renderer with the fastest vectors of this processor: AVX2 and FMA where it has them.
     pub fn new() -> Self {
         #[cfg(target_arch = "x86_64")]
         if let Some(v3) = pulp::x86::V3::try_new() {
@@ -102,7 +104,7 @@ impl CpuRenderer {
         Self::portable()
     }
 
-    /// With the target's guaranteed instructions only; for tests and for comparison.
+    /// A renderer with the target's guaranteed instructions only; for tests and for comparison.
     pub fn portable() -> Self {
         Self::with_level(Level::Portable(pulp::Scalar256b))
     }
@@ -120,8 +122,8 @@ impl CpuRenderer {
         }
     }
 
-    /// As [`Renderer::render`], into a picture whose memory is reused. The times are of a pinhole camera's stages, and
-    /// zero through a lens.
+    /// As [`Renderer::render`], into a picture whose memory is reused. The times are those of a pinhole camera's
+    /// stages, and zero through a lens.
     pub fn render_into(
         &self,
         gaussians: &Gaussians,
@@ -133,7 +135,7 @@ impl CpuRenderer {
     }
 
     fn pool(&self) -> MutexGuard<'_, Vec<Scratch>> {
-        // A panic elsewhere cannot leave a list of spare buffers in a state that matters.
+        // A panic elsewhere cannot corrupt a list of spare buffers.
         self.scratch.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -142,7 +144,7 @@ impl CpuRenderer {
         if let Some(map) = known.filter(|map| map.fits(camera)) {
             return Ok(map);
         }
-        // Not while holding the lock: the map is made in parallel, and a waiting thread may be one of rayon's.
+        // The lock is not held here: the map is made in parallel, and a waiting thread may be one of rayon's.
         let map = Arc::new(LensMap::new(camera)?);
         *self.lens.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(&map));
         Ok(map)
@@ -172,7 +174,7 @@ fn draw<S: Lanes>(
     times
 }
 
-/// Splats, their depth order and their bounds in it.
+/// Computes the splats, their depth order, and their bounds in this order.
 fn prepare<S: Lanes>(
     simd: S,
     gaussians: &Gaussians,
@@ -187,7 +189,7 @@ fn prepare<S: Lanes>(
     let projected = Instant::now();
     sort_by_depth(scratch);
     let sorted = Instant::now();
-    bin::bounds_in_order(&scratch.order, &scratch.pixel_bounds, &mut scratch.bounds);
+    bin::bounds_in_order(&scratch.splat_from_rank, &scratch.pixel_bounds, &mut scratch.bounds_from_rank);
     StageTimes {
         project: projected - start,
         sort: sorted - projected,
@@ -196,7 +198,7 @@ fn prepare<S: Lanes>(
     }
 }
 
-/// Draws what is prepared; whether it took one slice, so that the stripes list the whole picture.
+/// Draws the prepared splats. Returns whether one slice was enough, so that the stripes list the whole picture.
 fn blend_in_slices<S: Lanes>(
     simd: S,
     camera: &Camera,
@@ -208,17 +210,17 @@ fn blend_in_slices<S: Lanes>(
     times: &mut StageTimes,
 ) -> bool {
     let grid = Grid::new(camera.width, camera.height);
-    let Scratch { splats, order, bounds, stripes, .. } = scratch;
+    let Scratch { splats, splat_from_rank, bounds_from_rank, stripes, .. } = scratch;
     resize(target, camera.width, camera.height);
     let mut drawn = 0;
     // Runs once for an empty scene too, to draw the background.
     loop {
         let begin = Instant::now();
         let first = drawn == 0;
-        let slice = drawn..drawn + bin::slice_len(&bounds[drawn..], pair_budget);
+        let slice = drawn..drawn + bin::slice_len(&bounds_from_rank[drawn..], pair_budget);
         drawn = slice.end;
-        let last = drawn == order.len();
-        bin::bin(&grid.window(), &order[slice.clone()], &bounds[slice], stripes);
+        let last = drawn == splat_from_rank.len();
+        bin::bin(&grid.window(), &splat_from_rank[slice.clone()], &bounds_from_rank[slice], stripes);
         let binned = Instant::now();
         let unfinished = blend_all(simd, grid, stripes, splats, options, watch, target, [first, last]);
         times.bin += binned - begin;
@@ -227,8 +229,8 @@ fn blend_in_slices<S: Lanes>(
             return first;
         }
         if !unfinished {
-            // Nothing farther can show; an empty slice completes the picture.
-            drawn = order.len();
+            // Nothing farther is visible; an empty slice completes the picture.
+            drawn = splat_from_rank.len();
         }
     }
 }
@@ -249,7 +251,7 @@ fn project_all<S: Lanes>(
     let chunks = chunks.zip(pixel_bounds.par_chunks_mut(PROJECT_CHUNK));
     chunks.enumerate().for_each(|(i, ((splats, keys), bounds))| {
         if watch.is_stopped() {
-            // What an earlier picture left there may be of Gaussians that there are no more.
+            // Keys of an earlier picture may belong to Gaussians that no longer exist.
             return keys.fill(project::NOT_DRAWN);
         }
         let range = i * PROJECT_CHUNK..i * PROJECT_CHUNK + keys.len();
@@ -261,13 +263,13 @@ fn project_all<S: Lanes>(
 }
 
 fn sort_by_depth(scratch: &mut Scratch) {
-    let Scratch { keys, entries, entries_other, order, .. } = scratch;
+    let Scratch { keys, entries, entries_other, splat_from_rank, .. } = scratch;
     entries.clear();
     let drawn = keys.iter().enumerate().filter(|(_, k)| **k != project::NOT_DRAWN);
     entries.extend(drawn.map(|(i, &k)| sort::entry(k, i as u32)));
     sort::sort(entries, entries_other);
-    order.clear();
-    order.extend(entries.iter().map(|&e| sort::index(e)));
+    splat_from_rank.clear();
+    splat_from_rank.extend(entries.iter().map(|&e| sort::index(e)));
 }
 
 fn resize(target: &mut Rendered, width: u32, height: u32) {
@@ -278,7 +280,7 @@ fn resize(target: &mut Rendered, width: u32, height: u32) {
     target.depth.resize(pixels, 0.0);
 }
 
-/// Blends one slice of the depth order into every tile, a band of rows per task; whether a pixel is unfinished.
+/// Blends one slice of the depth order into every tile, a band of rows per task. Returns whether a pixel is unfinished.
 fn blend_all<S: Lanes>(
     simd: S,
     grid: Grid,
@@ -299,7 +301,7 @@ fn blend_all<S: Lanes>(
             return unfinished;
         }
         let mut planes = Planes { color, alpha, depth, width };
-        let stripe = bin::stripe_of(stripes, row);
+        let stripe = bin::stripe_with_row(stripes, row);
         for column in 0..grid.columns {
             let x0 = column * TILE_WIDTH;
             if first {
@@ -307,12 +309,12 @@ fn blend_all<S: Lanes>(
             } else {
                 tile.load(&planes, x0);
             }
-            let list = stripe.tile(column, row);
+            let tile_entries = stripe.tile(column, row);
             simd.vectorize(
                 #[inline(always)]
                 || {
                     let origin = [x0, row * TILE_HEIGHT];
-                    blend::blend(simd, tile, origin, list, splats, options.max_alpha, &mut Forget);
+                    blend::blend(simd, tile, origin, tile_entries, splats, options.max_alpha, &mut NoRecord);
                 },
             );
             if last {

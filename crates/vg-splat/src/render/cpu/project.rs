@@ -1,10 +1,10 @@
-//! Gaussians to splats: EWA projection (method section 5), eight at a time.
+//! EWA projection of Gaussians to splats (method section 5), eight at a time.
 //!
 //! With J R R_q S = [a; b] the 2x3 matrix that maps the unit sphere to pixels, the blurred covariance is
-//! `[[a.a + e, a.b], [a.b, b.b + e]]` and its determinant, by Cauchy-Binet, `e^2 + e (a.a + b.b) + |a x b|^2`:
-//! a sum of squares, exact to rounding for needles, where `ac - b^2` loses every digit.
-//! The projection is in f64: it is a tenth of a picture's time, needs no care for scales of 1e-38 or 1e9 m, for
-//! focal lengths of 1e9 pixels or for cameras 1e6 m away, and leaves all of f32's error to the blend.
+//! `[[a.a + e, a.b], [a.b, b.b + e]]` and its determinant, by Cauchy-Binet, `e^2 + e (a.a + b.b) + |a x b|^2`: a sum of
+//! squares, exact to rounding for needles, where `ac - b^2` loses every digit.
+//! The projection is in f64: it takes a tenth of a picture's time, needs no special handling of scales of 1e-38 or
+//! 1e9 m, focal lengths of 1e9 pixels or cameras 1e6 m away, and leaves all of f32's error to the blend.
 
 use super::color;
 use super::splat::{PixelBounds, Splat};
@@ -22,8 +22,8 @@ const HALF_LOG2_E: f64 = 0.5 * std::f64::consts::LOG2_E;
 /// Gaussians projected together.
 pub(super) const LANES: usize = 8;
 
-/// Projects the Gaussians of `range` into `splats`, `bounds` (the pixels they may touch) and `keys` (bits of z, or [`NOT_DRAWN`]); those that
-/// are not drawn keep an old splat.
+/// Projects the Gaussians of `range` into `splats`, `bounds` (the pixels that they may touch) and `keys` (bits of z, or
+/// [`NOT_DRAWN`]). Splats of Gaussians that are not drawn are not written.
 #[inline(always)]
 pub(super) fn project(
     view: &PinholeView,
@@ -82,7 +82,7 @@ pub(super) fn project(
     }
 }
 
-/// Eight Gaussians, transposed so that a lane is a Gaussian.
+/// Eight Gaussians, transposed so that each lane is a Gaussian.
 #[derive(Default)]
 pub(super) struct Inputs {
     pub(super) mean: [[f32; LANES]; 3],
@@ -121,21 +121,21 @@ struct Outputs {
     row: [f32; LANES],
     /// x0, x1, y0, y1
     bounds: [[i32; LANES]; 4],
-    /// From the camera to the Gaussian, unit.
+    /// Unit vector from the camera to the Gaussian.
     direction: [[f32; LANES]; 3],
-    /// Lane first: one Gaussian's functions lie together.
+    /// Lane first, so that the functions of one Gaussian are contiguous.
     basis: [[f32; 16]; LANES],
 }
 
-/// One Gaussian before its scale: where it is in the camera's frame, and the Jacobian there.
+/// One Gaussian before its scale is applied: its place in the camera's frame, and the Jacobian there.
 pub(super) struct Placed {
-    /// From the camera's centre, vehicle frame.
+    /// Vector from the camera's centre, vehicle frame.
     pub(super) d: [f64; 3],
     pub(super) depth: f64,
     pub(super) inverse_z: f64,
     /// x/z and y/z.
     pub(super) point: [f64; 2],
-    /// The same, clamped to where the Jacobian is taken.
+    /// x/z and y/z, clamped to where the Jacobian is taken.
     pub(super) clamped: [f64; 2],
     /// fx/z and fy/z.
     pub(super) magnification: [f64; 2],
@@ -145,16 +145,16 @@ pub(super) struct Placed {
     pub(super) quaternion: [f64; 4],
     /// 2/|q|^2: the quaternion is unit to f32 only, and this makes R_q a rotation to f64.
     pub(super) two: f64,
-    /// Of R_q.
+    /// Columns of R_q.
     pub(super) columns: [[f64; 3]; 3],
     /// Rows of J R R_q.
     pub(super) rows: [[f64; 3]; 2],
 }
 
-/// What the way there and the way back begin with.
+/// Computes the part of the projection that the forward and backward pass share.
 #[inline(always)]
 pub(super) fn placed(view: &PinholeView, g: &Inputs, l: usize) -> Placed {
-    // The difference first, so that a distant camera costs no digits.
+    // The difference is taken first, so that a distant camera loses no digits.
     let mut d = [0.0; 3];
     for k in 0..3 {
         d[k] = f64::from(g.mean[k][l]) - view.center[k];
@@ -199,7 +199,7 @@ pub(super) fn placed(view: &PinholeView, g: &Inputs, l: usize) -> Placed {
     }
 }
 
-/// One lane, without branches or closures, so that the compiler turns the loop over lanes into vectors.
+/// Projects one lane, without branches or closures, so that the compiler vectorises the loop over lanes.
 #[inline(always)]
 fn project_lane(view: &PinholeView, g: &Inputs, out: &mut Outputs, l: usize) {
     let Placed { d, depth: z, point: [x, y], rows: [pa, pb], .. } = placed(view, g, l);
@@ -226,7 +226,7 @@ fn project_lane(view: &PinholeView, g: &Inputs, out: &mut Outputs, l: usize) {
     let inverse_pivot = 1.0 / pivot;
     let conditional = HALF_LOG2_E * pivot / determinant;
 
-    // Opacity, and how far from the centre it stays above the threshold.
+    // Opacity, and the distance from the centre up to which alpha reaches the threshold.
     let floor = f64::from(MIN_COMPENSATION * MIN_COMPENSATION);
     let compensation = (determinant_before / determinant).max(floor).sqrt();
     let opacity = if view.antialiased { opacity * compensation } else { opacity } as f32;
@@ -262,7 +262,7 @@ fn project_lane(view: &PinholeView, g: &Inputs, out: &mut Outputs, l: usize) {
     out.q_max[l] = q_max;
     let inverse_y = 1.0 / variance_y;
     out.center_slope[l] = (covariance_xy * inverse_y) as f32;
-    // A form wider than f32 holds stays finite: infinity times 0 would lose its rows.
+    // Clamped to stay finite in f32: infinity times 0 would be NaN and lose the splat's rows.
     out.inverse_column[l] = (determinant * inverse_y * (1.0 / HALF_LOG2_E)).min(1e38) as f32;
     out.row[l] = (HALF_LOG2_E * inverse_y) as f32;
 
@@ -277,7 +277,7 @@ pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// An upper bound of log2(x), at most 0.03 above it, for normal x; anything for other x.
+/// An upper bound of log2(x), at most 0.03 above it, for normal x; unspecified for other x.
 #[inline(always)]
 fn log2_at_least(x: f32) -> f32 {
     let bits = x.to_bits();

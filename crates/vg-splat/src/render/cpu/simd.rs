@@ -1,23 +1,23 @@
-//! Eight f32 lanes on whatever the processor has, and the exponential they need.
+//! Vectors of eight f32 lanes, and their exponential.
 //!
-//! Kernels are written once, generic over [`Lanes`]: pulp's AVX2 + FMA level, found at run time, or its plain
-//! arrays of eight, which the compiler turns into what the target guarantees. Both are eight wide, so one memory
-//! layout serves both.
+//! Kernels are written once, generic over [`Lanes`]: pulp's AVX2 + FMA level, detected at run time, or its plain arrays
+//! of eight, which the compiler maps to the target's guaranteed instructions. Both are eight wide, so one memory layout
+//! serves both.
 
 use pulp::{Scalar256b, Simd, f32x8, i32x8, m32x8, u32x8};
 
-/// A vector width of eight, with two operations that pulp has no fitting one for.
+/// A vector of eight lanes, with operations for which pulp has no suitable one.
 pub(super) trait Lanes: Simd<f32s = f32x8, u32s = u32x8, i32s = i32x8, m32s = m32x8> {
-    /// Bit l is lane l's sign bit.
+    /// The sign bits of the lanes; bit l is that of lane l.
     fn sign_bits(self, a: f32x8) -> u32;
 
     /// The low bytes of the lanes, lane 0 in the lowest; every lane is below 256.
     fn low_bytes(self, a: u32x8) -> u64;
 
-    /// a b + c, fused where that is an instruction: pulp's own on plain arrays calls the C library per lane.
+    /// a b + c, fused where an instruction exists: pulp's own on plain arrays calls the C library for each lane.
     fn mul_add(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8;
 
-    /// Lane l is the sum of the lanes of `v[l]`.
+    /// The sums of the lanes of each vector; lane l is that of `v[l]`.
     fn sums(self, v: [f32x8; 8]) -> f32x8;
 }
 
@@ -67,7 +67,7 @@ impl Lanes for pulp::x86::V3 {
 
     #[inline(always)]
     fn low_bytes(self, a: u32x8) -> u64 {
-        // Packing works within halves: lanes 0-3 end up in the low half's first four bytes, 4-7 in the high half's.
+        // Packing works within halves: lanes 0-3 end in the low half's first four bytes, 4-7 in the high half's.
         let words = self.avx2._mm256_packus_epi32(pulp::cast(a), pulp::cast(a));
         let halves: [u32; 8] = pulp::cast(self.avx2._mm256_packus_epi16(words, words));
         u64::from(halves[0]) | u64::from(halves[4]) << 32
@@ -80,7 +80,7 @@ impl Lanes for pulp::x86::V3 {
 
     #[inline(always)]
     fn sums(self, v: [f32x8; 8]) -> f32x8 {
-        // Pairs, then fours, within halves; then low half to low half.
+        // Add pairs, then fours, within halves; then the two halves.
         let avx = self.avx;
         let v01 = avx._mm256_hadd_ps(pulp::cast(v[0]), pulp::cast(v[1]));
         let v23 = avx._mm256_hadd_ps(pulp::cast(v[2]), pulp::cast(v[3]));
@@ -94,7 +94,7 @@ impl Lanes for pulp::x86::V3 {
     }
 }
 
-/// Below this exponent [`exp2`] returns 2^-100, far under every alpha that is drawn.
+/// Below this exponent [`exp2`] returns 2^-100, far below every alpha that is drawn.
 const SMALLEST_EXPONENT: f32 = -100.0;
 
 /// 1.5 * 2^23: adding it rounds an f32 of magnitude below 2^22 to an integer, held in the low mantissa bits.
@@ -112,12 +112,12 @@ pub(super) fn exp2<S: Lanes>(simd: S, x: f32x8) -> f32x8 {
     for c in &EXP2_COEFFICIENTS[1..] {
         poly = simd.mul_add(poly, f, simd.splat_f32s(*c));
     }
-    // The integer sits in the low bits of `shifted`; moved into the exponent field it multiplies by 2^n.
+    // The integer is in the low bits of `shifted`; shifted into the exponent field it multiplies by 2^n.
     let n = simd.wrapping_dyn_shl_u32s(simd.transmute_u32s_f32s(shifted), simd.splat_u32s(23));
     simd.transmute_f32s_u32s(simd.add_u32s(simd.transmute_u32s_f32s(poly), n))
 }
 
-/// Highest power first; largest relative error before rounding 5.1e-9.
+/// Coefficients, highest power first; the largest relative error before rounding is 5.1e-9.
 const EXP2_COEFFICIENTS: [f32; 7] = [
     1.545_316_3e-4,
     1.339_086_3e-3,

@@ -1,12 +1,12 @@
-//! Depth order: a stable radix sort of the bits of z.
+//! Depth order by a stable radix sort of the bits of z.
 //!
-//! Positive floats sort like their bits. Ties keep the order of storage, which with the bits alone as key makes
-//! the picture independent of threads and of how the sort is cut up.
+//! Positive floats sort like their bits. Ties keep the order of storage, which makes the picture independent of threads
+//! and of how the sort is divided.
 
 /// Bits per pass: 2048 counters stay in L1, and 32 bits take at most three passes.
 const DIGIT_BITS: u32 = 11;
 
-/// A depth key above and a Gaussian's index below.
+/// Packs a depth key into the high half and a Gaussian's index into the low half.
 pub(super) fn entry(key: u32, index: u32) -> u64 {
     u64::from(key) << 32 | u64::from(index)
 }
@@ -18,8 +18,8 @@ pub(super) fn index(entry: u64) -> u32 {
 
 /// Sorts `entries` by key, stably; `scratch` is resized as needed.
 ///
-/// Only the bits in which the keys' distance from the smallest differs are sorted: a vehicle between 6 and 10 m
-/// needs 24 of the 32.
+/// Only the bits in which the keys' differences from the smallest vary are sorted: a vehicle between 6 and 10 m needs
+/// 24 of the 32.
 pub(super) fn sort(entries: &mut Vec<u64>, scratch: &mut Vec<u64>) {
     let key = |e: u64| (e >> 32) as u32;
     let Some(smallest) = entries.iter().map(|&e| key(e)).min() else { return };
@@ -29,7 +29,7 @@ pub(super) fn sort(entries: &mut Vec<u64>, scratch: &mut Vec<u64>) {
     if passes == 0 {
         return;
     }
-    // Equal shares: 24 bits are three passes of 8 rather than 11 + 11 + 2.
+    // Equal parts: 24 bits are three passes of 8 rather than 11 + 11 + 2.
     let digit_bits = bits.div_ceil(passes);
     let mask = (1u32 << digit_bits) - 1;
     scratch.resize(entries.len(), 0);

@@ -1,6 +1,6 @@
-//! One projected Gaussian, 64 bytes: everything the blend needs of it.
+//! One projected Gaussian, in 64 bytes.
 
-/// Rows and columns, first and last, that a splat may touch; inside the image.
+/// First and last column and row that a splat may touch, inside the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct PixelBounds {
     pub(super) x0: u16,
@@ -9,7 +9,7 @@ pub(super) struct PixelBounds {
     pub(super) y1: u16,
 }
 
-/// The exponent of a splat is, in base 2 with (dx, dy) from its centre to a pixel's centre,
+/// A projected Gaussian. Its exponent is, in base 2 with (dx, dy) from its centre to a pixel's centre,
 ///
 /// ```text
 /// pivot Y (c >= a):  q = conditional (dx - slope dy)^2 + marginal dy^2,  slope = b/c
@@ -24,7 +24,7 @@ pub(super) struct PixelBounds {
 pub(super) struct Splat {
     /// Centre in pixels, rounded to integers ...
     pub(super) center: [f32; 2],
-    /// ... and what rounding left over: together they hold the centre to 2^-25 of a pixel on any image.
+    /// ... and the remainder: together they represent the centre to 2^-25 of a pixel on any image.
     pub(super) center_rest: [f32; 2],
     pub(super) slope: f32,
     /// Negative with pivot X.
@@ -34,9 +34,9 @@ pub(super) struct Splat {
     pub(super) color: [f32; 3],
     /// Depth z, metres.
     pub(super) depth: f32,
-    /// Not less than log2(255 opacity): where q exceeds this, alpha is below 1/255.
+    /// At least log2(255 opacity): where q exceeds this, alpha is below 1/255.
     pub(super) q_max: f32,
-    /// The same form completed in x whichever the pivot is, for the width of a row:
+    /// The exponent completed to a square in x, whichever the pivot is, for the width of a row:
     /// q = (dx - center_slope dy)^2 / inverse_column + row dy^2, with b/c, det/c 2/log2(e) and log2(e)/2 / c.
     pub(super) center_slope: f32,
     pub(super) inverse_column: f32,

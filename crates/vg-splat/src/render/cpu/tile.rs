@@ -3,9 +3,9 @@
 use crate::render::{Background, DepthMode, RenderOptions};
 use pulp::f32x8;
 
-/// Pixels of one vector.
+/// Pixels in one vector.
 pub(super) const BLOCK: usize = 8;
-/// Vectors side by side in a tile.
+/// Vectors in a row of a tile.
 pub(super) const BLOCKS: usize = 8;
 /// Columns of a tile.
 pub(super) const TILE_WIDTH: usize = BLOCK * BLOCKS;
@@ -31,8 +31,8 @@ const ZERO: f32x8 = f32x8(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
 pub(super) struct Tile {
     /// Row by row.
     pub(super) blocks: [Block; BLOCKS * TILE_HEIGHT],
-    /// Bit b of entry r: block b of row r has a pixel that is not finished. Eight rows beyond the last are never
-    /// live, so that eight can be read from any row on.
+    /// Bit b of entry r: block b of row r has an unfinished pixel. Eight rows beyond the last are never live, so that
+    /// eight can be read from any row on.
     pub(super) live: [u8; TILE_HEIGHT + 8],
 }
 
@@ -61,12 +61,12 @@ impl Tile {
         Self { blocks: [block; BLOCKS * TILE_HEIGHT], live: [0; TILE_HEIGHT + 8] }
     }
 
-    /// Nothing drawn yet. Pixels outside the picture count as finished.
+    /// Resets the tile to nothing drawn. Pixels outside the picture count as finished.
     pub(super) fn clear(&mut self, planes: &Planes, x0: usize) {
         self.clear_part(planes.columns(x0), planes.rows());
     }
 
-    /// Nothing drawn yet on the first `columns` and `rows`; what lies beyond them counts as finished.
+    /// Resets the first `columns` and `rows` to nothing drawn; pixels beyond them count as finished.
     pub(super) fn clear_part(&mut self, columns: usize, rows: usize) {
         for (r, row) in self.blocks.chunks_exact_mut(BLOCKS).enumerate() {
             let mut live = 0;
@@ -80,13 +80,13 @@ impl Tile {
         }
     }
 
-    /// Whether a pixel is not finished.
+    /// Whether a pixel is unfinished.
     #[inline(always)]
     pub(super) fn is_live(&self) -> bool {
         self.live != [0; TILE_HEIGHT + 8]
     }
 
-    /// Takes up where an earlier slice of the depth order left off (see [`Tile::store_unfinished`]).
+    /// Loads the sums of an earlier slice of the depth order (see [`Tile::store_unfinished`]).
     pub(super) fn load(&mut self, planes: &Planes, x0: usize) {
         self.clear(planes, x0);
         for r in 0..planes.rows() {
@@ -110,12 +110,12 @@ impl Tile {
         }
     }
 
-    /// The sums as they stand: the transmittance, with its sign, in the plane of alpha.
+    /// Stores the intermediate sums, with the signed transmittance in the plane of alpha.
     pub(super) fn store_unfinished(&self, planes: &mut Planes, x0: usize) {
         self.store(planes, x0, |t, color, depth| (color, t, depth));
     }
 
-    /// The picture: background, alpha = 1 - T, and depth as the options want it.
+    /// Stores the picture: with the background, alpha = 1 - T, and depth by the options.
     pub(super) fn store_finished(&self, planes: &mut Planes, x0: usize, options: &RenderOptions) {
         let behind = match options.background {
             Background::Color(rgb) => rgb,

@@ -1,5 +1,4 @@
-//! The fast renderer for callers that may lose interest: rows and tiles that are left are left out once the work is
-//! stopped.
+//! The fast renderer with cancellation: once the work is stopped, the remaining rows and tiles are skipped.
 
 use super::{CpuRenderer, Level, StageTimes, draw};
 use crate::gaussians::Gaussians;
@@ -8,8 +7,8 @@ use vg_geometry::Camera;
 use vg_geometry::Result;
 use vg_geometry::progress::Watch;
 
-/// A renderer whose pictures can be stopped: with [`Error::Cancelled`](vg_geometry::Error::Cancelled), and a target that holds
-/// nothing in particular.
+/// A renderer whose pictures can be cancelled: with [`Error::Cancelled`](crate::Error::Cancelled), and unspecified
+/// contents of the target.
 #[derive(Clone, Copy, Debug)]
 pub struct Watched<'a> {
     pub(super) renderer: &'a CpuRenderer,
@@ -17,7 +16,7 @@ pub struct Watched<'a> {
 }
 
 impl CpuRenderer {
-    /// The same renderer under `watch`.
+    /// This renderer under `watch`.
     pub fn watched<'a>(&'a self, watch: &'a Watch) -> Watched<'a> {
         Watched { renderer: self, watch }
     }

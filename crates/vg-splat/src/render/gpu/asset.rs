@@ -9,27 +9,27 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use vg_geometry::Camera;
 use vg_geometry::Result;
 
-/// Floats of a Gaussian without its colour: mean, quaternion, standard deviations, opacity.
+/// Number of floats of a Gaussian without its colour: mean, quaternion, standard deviations, opacity.
 const SHAPE: usize = 11;
 
 /// Gaussians in the memory of a [`GpuRenderer`](super::GpuRenderer)'s device.
 #[derive(Debug)]
 pub struct GpuAsset {
-    /// No other has it in this process.
+    /// Unique in this process.
     pub(super) id: u64,
     pub(super) count: usize,
     pub(super) sh_degree: u8,
     pub(super) chunks: Vec<Chunk>,
-    /// Of the means, metres; f32::MAX..f32::MIN where there are none.
+    /// Bounds of the means, metres; from infinity to -infinity where there are none.
     low: DVec3,
     high: DVec3,
 }
 
-/// Gaussians that follow each other, as many as fit in what a kernel may be given.
+/// Consecutive Gaussians, as many as fit in one binding.
 #[derive(Debug)]
 pub(super) struct Chunk {
     pub(super) count: usize,
-    /// Number of the first Gaussian, and the count.
+    /// Index of the first Gaussian, and the count.
     pub(super) range: wgpu::Buffer,
     pub(super) shapes: wgpu::Buffer,
     pub(super) colors: wgpu::Buffer,
@@ -68,7 +68,7 @@ impl GpuAsset {
                 shapes: buffer("shapes", bytemuck::cast_slice(&shapes)),
                 colors: buffer("colors", bytemuck::cast_slice(colors)),
             });
-            // So that what was staged on the way is given back before the next.
+            // Frees the staging memory before the next chunk.
             device.queue.submit([]);
             let _ = device.device.poll(wgpu::PollType::wait_indefinitely());
             device.check()?;
@@ -78,44 +78,44 @@ impl GpuAsset {
         Ok(Self { id, count: gaussians.len(), sh_degree: gaussians.sh_degree(), chunks, low, high })
     }
 
-    /// How many Gaussians there are.
+    /// The number of Gaussians.
     pub fn len(&self) -> usize {
         self.count
     }
 
-    /// Whether there are none.
+    /// Whether there are no Gaussians.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// Of their colours, 0 to 3.
+    /// SH degree of the colours, 0 to 3.
     pub fn sh_degree(&self) -> u8 {
         self.sh_degree
     }
 
-    /// What they take on the device, bytes.
+    /// Memory on the device, bytes.
     pub fn bytes(&self) -> u64 {
         self.chunks.iter().map(|c| c.shapes.size() + c.colors.size()).sum()
     }
 
-    /// Bounds of the depths that can occur between `near` and `far`, metres: fewer digits to sort by.
+    /// Bounds of the depths that can occur between `near` and `far`, metres, which leave fewer bits to sort by.
     pub(super) fn depths(&self, camera: &Camera, [near, far]: [f32; 2]) -> [f32; 2] {
         let axis = camera.vehicle_from_camera.rotation.z_axis;
         let center = camera.center();
         // The corner farthest along the axis, and the nearest.
         let farthest = DVec3::select(axis.cmpge(DVec3::ZERO), self.high, self.low) - center;
         let nearest = DVec3::select(axis.cmpge(DVec3::ZERO), self.low, self.high) - center;
-        // What the kernel's double floats may differ by, and f32's rounding.
+        // Tolerance for the kernel's double-float arithmetic and the rounding to f32.
         let reach = farthest.abs().max(nearest.abs()).max_element();
         let bound = |depth: f64, sign: f64| (depth + sign * (1e-6 * depth.abs() + 1e-9 * reach)) as f32;
         let (first, last) = (bound(axis.dot(nearest), -1.0), bound(axis.dot(farthest), 1.0));
-        // NaN of an empty asset's bounds becomes the other.
+        // The NaN from an empty asset's bounds is replaced by `near` or `far`.
         let first = first.max(near).min(far);
         [first, last.min(far).max(first)]
     }
 }
 
-/// Coefficients per channel that are looked at.
+/// The number of coefficients per channel that are used.
 pub(super) fn coefficients(asset: &GpuAsset, sh_degree: u8) -> usize {
     sh::coefficients(sh_degree.min(asset.sh_degree))
 }

@@ -1,4 +1,4 @@
-//! Pictures of many cameras: the device draws the next one while the processor has the one before.
+//! Pictures of many cameras: the device draws the next one while the CPU processes the previous one.
 
 use super::GpuRenderer;
 use super::asset::GpuAsset;
@@ -10,11 +10,11 @@ use vg_geometry::Camera;
 use vg_geometry::Result;
 
 impl GpuRenderer {
-    /// A picture for each camera, made in the memory of `picture` and handed to `take` in their order with the camera's
-    /// number. Bytes are those of [`GpuRenderer::render_asset`] or [`GpuRenderer::render_asset_rgba8`]. `take` may use
-    /// this renderer.
+    /// Renders a picture for each camera into the memory of `picture` and passes it to `take` with the camera's index,
+    /// in order. The bytes are those of [`GpuRenderer::render_asset`] or [`GpuRenderer::render_asset_rgba8`]. `take`
+    /// may use this renderer.
     ///
-    /// Errors: those of `take` and of [`GpuRenderer::render_asset`], of the camera that comes first.
+    /// Errors: those of `take` and of [`GpuRenderer::render_asset`], for the first camera that has one.
     pub fn render_each<P: Picture>(
         &self,
         asset: &GpuAsset,
@@ -45,13 +45,13 @@ impl GpuRenderer {
         Ok(())
     }
 
-    /// Hands a picture to the device, if one slice of one band may be all of it.
+    /// Submits a picture to the device, if it may fit into one slice of one band.
     fn begin(
         &self,
         asset: &GpuAsset,
         camera: &Camera,
         options: &RenderOptions,
-        wanted_as: Pixels,
+        format: Pixels,
     ) -> Result<Option<Flight>> {
         camera.validate("camera")?;
         options.validate()?;
@@ -61,23 +61,23 @@ impl GpuRenderer {
         let mut held = self.lock();
         let mut memory = held.take().unwrap_or_else(|| Memory::new(&self.device));
         let (mut frame, depth_bits) = self.frame(asset, camera, options, &mut memory);
-        if self.rows_of_a_band(camera) < frame.tile_rows || memory.in_slices == Some(asset.id) {
+        if self.rows_per_band(camera) < frame.tile_rows || memory.sliced_asset == Some(asset.id) {
             *held = Some(memory);
             return Ok(None);
         }
         let rows = Rows { first: 0, count: frame.tile_rows };
         let tiles = tiles(camera, rows.count);
-        memory.for_band(&self.device, tiles, pixels(camera, rows));
-        memory.for_pairs(&self.device, first_guess(asset, self.bounds.pairs.max(tiles)));
-        frame.is_last = wanted_as.last();
-        let flight = self.submit_slice(asset, camera, &mut frame, depth_bits, &mut memory, wanted_as);
-        // What the device has against it is said to those who come next, if not now.
+        memory.reserve_band(&self.device, tiles, pixels(camera, rows));
+        memory.reserve_pairs(&self.device, first_guess(asset, self.bounds.pairs.max(tiles)));
+        frame.is_last = format.last();
+        let flight = self.submit_slice(asset, camera, &mut frame, depth_bits, &mut memory, format);
+        // An error that the device reports later is returned by a later call.
         self.device.check()?;
         *held = Some(memory);
         Ok(Some(flight))
     }
 
-    /// Waits for a picture; `false` if it was not all of it.
+    /// Waits for a picture; returns `false` if the slice did not contain all of it.
     fn end(&self, flight: Flight, camera: &Camera, target: &mut Target) -> Result<bool> {
         let mut held = self.lock();
         let mut memory = held.take().unwrap_or_else(|| Memory::new(&self.device));
@@ -86,7 +86,7 @@ impl GpuRenderer {
         let most = self.bounds.pairs.max(tiles(camera, camera.height.div_ceil(TILE)));
         let needed = u64::from(slice.pairs);
         if !slice.is_whole() && needed <= most {
-            memory.for_pairs(&self.device, needed.next_power_of_two().min(most));
+            memory.reserve_pairs(&self.device, needed.next_power_of_two().min(most));
         }
         *held = Some(memory);
         Ok(slice.is_whole())

@@ -1,28 +1,28 @@
-//! The graphics processor: found, opened once, and what it reports when something goes wrong.
+//! The graphics processor: selecting and opening it, and its errors.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use vg_geometry::threads::without_signals;
 use vg_geometry::{Error, Result};
 
-/// What is missing where no picture can be drawn.
+/// The missing component in errors.
 const WHAT: &str = "graphics processor";
 
-/// Which adapters are good enough.
+/// The adapters that are accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Adapter {
-    /// A graphics processor; not a driver that draws on the CPU.
+    /// Graphics processors only, not drivers that draw on the CPU.
     Hardware,
-    /// Whatever the driver offers, a graphics processor first. Drivers that draw on the CPU (Mesa's lavapipe) are for
-    /// tests: [`CpuRenderer`](crate::render::CpuRenderer) is faster there.
+    /// Any adapter, graphics processors first. Drivers that draw on the CPU (Mesa's lavapipe) are for tests:
+    /// [`CpuRenderer`](crate::render::CpuRenderer) is faster there.
     Any,
 }
 
-/// What went wrong since it was last asked.
+/// Errors that the driver reported since the last check.
 #[derive(Debug, Default)]
 struct Trouble {
-    /// The device is gone for good: why.
+    /// The reason why the device was lost, if it was.
     lost: Option<String>,
-    /// The first error since, in the driver's words.
+    /// The first error since the last check, in the driver's words.
     error: Option<String>,
 }
 
@@ -32,18 +32,18 @@ pub(super) struct Device {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     pub(super) info: wgpu::AdapterInfo,
-    /// Largest buffer that a kernel may be given, bytes.
+    /// Largest buffer that can be bound to a kernel, bytes.
     pub(super) largest_binding: u64,
     trouble: Arc<Mutex<Trouble>>,
 }
 
 impl Device {
-    /// Opens the best adapter that `wanted` allows. `WGPU_ADAPTER_NAME` in the environment, part of an adapter's name,
-    /// chooses among them.
+    /// Opens the best adapter that `wanted` allows. The environment variable `WGPU_ADAPTER_NAME`, part of an adapter's
+    /// name, selects among them.
     pub(super) fn open(wanted: Adapter) -> Result<Self> {
         let mut description = wgpu::InstanceDescriptor::new_without_display_handle();
         description.backends = wgpu::Backends::VULKAN;
-        // No layers of the developer's, whatever this is compiled for: they print.
+        // No validation layers in any build: they print.
         description.flags = wgpu::InstanceFlags::empty();
         let instance = wgpu::Instance::new(description);
         let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::VULKAN));
@@ -57,10 +57,12 @@ impl Device {
                 && (wanted == Adapter::Any || is_hardware(&a.get_info()))
         });
         adapters.sort_by_key(|a| rank(a.get_info().device_type));
-        let Some(adapter) = adapters.first() else { return Err(none(wanted, &names, chosen.as_deref())) };
+        let Some(adapter) = adapters.first() else {
+            return Err(no_adapter(wanted, &names, chosen.as_deref()));
+        };
         let info = adapter.get_info();
         let mut limits = adapter.limits();
-        // No kernel asks for more than every device has.
+        // No kernel needs more than every device provides.
         limits.max_storage_buffers_per_shader_stage = limits.max_storage_buffers_per_shader_stage.min(8);
         let opened = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("vg"),
@@ -73,35 +75,35 @@ impl Device {
         let (device, queue) = without_signals(|| pollster::block_on(opened)).map_err(|e| Error::Missing {
             what: WHAT,
             found: format!("{} cannot be opened: {e}", info.name),
-            remedy: "see to its driver, or draw on the CPU".into(),
+            remedy: "check its driver, or draw on the CPU".into(),
         })?;
 
         let trouble = Arc::new(Mutex::new(Trouble::default()));
-        let of_errors = Arc::clone(&trouble);
+        let error_trouble = Arc::clone(&trouble);
         device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| {
-            locked(&of_errors).error.get_or_insert_with(|| words(&e));
+            locked(&error_trouble).error.get_or_insert_with(|| error_text(&e));
         }));
-        let of_loss = Arc::clone(&trouble);
+        let loss_trouble = Arc::clone(&trouble);
         device.set_device_lost_callback(move |reason, message| {
             let message = message.trim().trim_end_matches('.').to_owned();
             let why = if message.is_empty() { format!("{reason:?}") } else { message };
-            locked(&of_loss).lost.get_or_insert(why);
+            locked(&loss_trouble).lost.get_or_insert(why);
         });
         let largest_binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         Ok(Self { device, queue, info, largest_binding, trouble })
     }
 
-    /// Whether it draws on the CPU.
+    /// Whether the driver draws on the CPU.
     pub(super) fn is_software(&self) -> bool {
         !is_hardware(&self.info)
     }
 
-    /// Whether it is gone for good.
+    /// Whether the device was lost.
     pub(super) fn is_lost(&self) -> bool {
         locked(&self.trouble).lost.is_some()
     }
 
-    /// The error that came since this was last asked.
+    /// Returns an error that the driver reported since the last check.
     pub(super) fn check(&self) -> Result<()> {
         let mut trouble = locked(&self.trouble);
         let error = trouble.error.take();
@@ -121,27 +123,27 @@ impl Device {
         }
     }
 
-    /// What is said where a kernel found out that it was not run to its end.
-    pub(super) fn cuts_loops_short(&self) -> Error {
+    /// The error where a kernel detected that the driver ended a loop early.
+    pub(super) fn loop_limit_error(&self) -> Error {
         Error::Missing {
             what: WHAT,
             found: format!(
-                "{} leaves loops before their end, and a list of this picture is too long",
+                "the driver of {} ends long loops early, and a list of this picture is too long",
                 self.info.name
             ),
-            remedy: "draw fewer Gaussians that lie behind each other, or draw on the CPU".into(),
+            remedy: "draw fewer overlapping Gaussians, or draw on the CPU".into(),
         }
     }
 
-    /// Ends the device, as a driver's reset would.
+    /// Destroys the device, as a driver's reset would.
     pub(super) fn lose(&self) {
         self.device.destroy();
-        // The loss is told while waiting.
+        // The loss is reported while waiting.
         let _ = self.device.poll(wgpu::PollType::wait_indefinitely());
         locked(&self.trouble).lost.get_or_insert_with(|| "destroyed".into());
     }
 
-    /// Hands each of `buffers`, of which the first so many bytes are wanted, to `take` when what was submitted is done.
+    /// Waits for a submission and passes the given number of leading bytes of each of `buffers` to `take`.
     pub(super) fn read(
         &self,
         submitted: wgpu::SubmissionIndex,
@@ -149,7 +151,7 @@ impl Device {
         mut take: impl FnMut(usize, &[u8]),
     ) -> Result<()> {
         for (buffer, bytes) in buffers {
-            // An error is one of the device's too; it is looked for below.
+            // An error is also reported by the device, and checked below.
             buffer.map_async(wgpu::MapMode::Read, 0..*bytes, |_| {});
         }
         let wait = wgpu::PollType::Wait { submission_index: Some(submitted), timeout: None };
@@ -158,7 +160,7 @@ impl Device {
         if let Err(e) = waited {
             return Err(Error::Missing {
                 what: WHAT,
-                found: format!("{} does not answer: {e}", self.info.name),
+                found: format!("{} does not respond: {e}", self.info.name),
                 remedy: "draw on the CPU".into(),
             });
         }
@@ -168,7 +170,7 @@ impl Device {
                 Err(e) => {
                     return Err(Error::Missing {
                         what: WHAT,
-                        found: format!("{} gives nothing back: {e}", self.info.name),
+                        found: format!("{} returns no data: {e}", self.info.name),
                         remedy: "draw on the CPU".into(),
                     });
                 }
@@ -187,7 +189,7 @@ fn is_hardware(info: &wgpu::AdapterInfo) -> bool {
     info.device_type != wgpu::DeviceType::Cpu
 }
 
-/// Adapters in the order they are tried.
+/// Rank of an adapter; lower ones are preferred.
 fn rank(kind: wgpu::DeviceType) -> u32 {
     match kind {
         wgpu::DeviceType::DiscreteGpu => 0,
@@ -198,20 +200,22 @@ fn rank(kind: wgpu::DeviceType) -> u32 {
     }
 }
 
-/// Whether an adapter's name has this part, whatever the case.
+/// Whether an adapter's name contains this part, ignoring case.
 fn contains(name: &str, part: &str) -> bool {
     name.to_lowercase().contains(&part.to_lowercase())
 }
 
-fn none(wanted: Adapter, names: &[String], chosen: Option<&str>) -> Error {
+fn no_adapter(wanted: Adapter, names: &[String], chosen: Option<&str>) -> Error {
     let found = match (names, wanted) {
         ([], _) => "no Vulkan driver".to_owned(),
         (names, _) if chosen.is_some_and(|chosen| !names.iter().any(|n| contains(n, chosen))) => {
             let chosen = chosen.unwrap_or_default();
-            format!("none of WGPU_ADAPTER_NAME {chosen:?} among {}", names.join(", "))
+            format!("no adapter matches WGPU_ADAPTER_NAME {chosen:?} among {}", names.join(", "))
         }
-        (names, Adapter::Hardware) => format!("none among {}, which draw on the CPU", names.join(", ")),
-        (names, Adapter::Any) => format!("none that can be used among {}", names.join(", ")),
+        (names, Adapter::Hardware) => {
+            format!("no hardware adapter, only drivers that draw on the CPU: {}", names.join(", "))
+        }
+        (names, Adapter::Any) => format!("no usable adapter among {}", names.join(", ")),
     };
     Error::Missing {
         what: WHAT,
@@ -220,8 +224,8 @@ fn none(wanted: Adapter, names: &[String], chosen: Option<&str>) -> Error {
     }
 }
 
-/// One line of an error's causes.
-fn words(error: &wgpu::Error) -> String {
+/// Text of an error in one line.
+fn error_text(error: &wgpu::Error) -> String {
     let text = match error {
         wgpu::Error::OutOfMemory { .. } => "out of memory".to_owned(),
         other => other.to_string(),

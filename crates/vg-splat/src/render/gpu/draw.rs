@@ -1,26 +1,26 @@
-//! A picture: bands of bounded size, a band in slices of bounded pairs. One of each is the rule, and then the processor
-//! waits once.
+//! Drawing a picture: in bands of bounded size, a band in slices of bounded pairs. Usually there is one of each, and
+//! the CPU waits once.
 
 use super::asset::GpuAsset;
 use super::frame::{Frame, TILE};
-use super::memory::{Made, Memory, NUMBERS, PIXEL, Readback};
-use super::stages::{Stages, bits_of};
+use super::memory::{Memory, NUMBERS, PIXEL, Readback, Source};
+use super::stages::{Stages, significant_bits};
 use super::{GpuRenderer, MOST_TILES};
 use crate::render::{RenderOptions, Rendered};
 use vg_geometry::Camera;
 use vg_geometry::Result;
 
-/// Splats of a slice where the driver leaves loops before their end.
+/// Splats of a slice where the driver ends long loops early.
 const FEW: u32 = 1 << 15;
 
-/// What a picture is wanted as.
+/// The format of a picture.
 #[derive(Clone, Copy)]
 pub(super) enum Pixels {
     Planes,
     Bytes,
 }
 
-/// Where a picture goes.
+/// The target of a picture.
 #[derive(Debug)]
 pub enum Target<'a> {
     /// Colour, alpha and depth.
@@ -30,7 +30,7 @@ pub enum Target<'a> {
 }
 
 impl GpuRenderer {
-    /// Of a valid camera without a lens.
+    /// Draws the picture of a valid camera without a lens.
     pub(super) fn draw(
         &self,
         asset: &GpuAsset,
@@ -39,7 +39,7 @@ impl GpuRenderer {
         mut target: Target,
     ) -> Result<()> {
         let mut held = self.lock();
-        // What an error left is not to be trusted: it is taken, and put back when all went well.
+        // An error may leave the memory inconsistent, so it is taken out and put back only on success.
         let mut memory = held.take().unwrap_or_else(|| Memory::new(&self.device));
         self.draw_bands(asset, camera, options, &mut memory, &mut target)?;
         *held = Some(memory);
@@ -56,10 +56,10 @@ impl GpuRenderer {
     ) -> Result<()> {
         let (mut frame, depth_bits) = self.frame(asset, camera, options, memory);
         let whole = Rows { first: 0, count: frame.tile_rows };
-        let most = self.rows_of_a_band(camera);
+        let most = self.rows_per_band(camera);
         target.resize(camera);
 
-        memory.for_band(&self.device, tiles(camera, most), pixels(camera, Rows { count: most, ..whole }));
+        memory.reserve_band(&self.device, tiles(camera, most), pixels(camera, Rows { count: most, ..whole }));
         for first in (0..whole.count).step_by(most as usize) {
             let rows = Rows { first, count: most.min(whole.count - first) };
             (frame.first_tile_row, frame.tile_rows) = (rows.first, rows.count);
@@ -68,7 +68,7 @@ impl GpuRenderer {
         Ok(())
     }
 
-    /// What kernels are to know of the picture, with room for its Gaussians, and how many bits their depths differ in.
+    /// The kernels' parameters, and the number of bits in which depths differ. Reserves memory for the Gaussians.
     pub(super) fn frame(
         &self,
         asset: &GpuAsset,
@@ -77,14 +77,14 @@ impl GpuRenderer {
         memory: &mut Memory,
     ) -> (Frame, u32) {
         let depths = asset.depths(camera, [options.near, options.far]);
-        let depth_bits = bits_of((depths[1].to_bits() - depths[0].to_bits()).saturating_add(1));
+        let depth_bits = significant_bits((depths[1].to_bits() - depths[0].to_bits()).saturating_add(1));
         let frame = Frame::new(asset, camera, options, depths);
-        memory.for_gaussians(&self.device, asset.count as u64);
+        memory.reserve_gaussians(&self.device, asset.count as u64);
         self.device.queue.write_buffer(&memory.counters.gaussians, 0, bytemuck::bytes_of(&frame.count));
         (frame, depth_bits)
     }
 
-    /// One band: in one slice if its pairs fit, else slice after slice until every pixel is finished.
+    /// Draws one band: in one slice if its pairs fit, else slice after slice until every pixel is finished.
     fn draw_band(
         &self,
         asset: &GpuAsset,
@@ -95,23 +95,23 @@ impl GpuRenderer {
         target: &mut Target,
     ) -> Result<()> {
         let rows = Rows { first: frame.first_tile_row, count: frame.tile_rows };
-        // A splat has at most one pair per tile: a slice holds one at least.
+        // A splat has at most one pair per tile, so a slice holds at least one splat.
         let most_pairs = self.bounds.pairs.max(tiles(camera, rows.count));
         let mut wanted = first_guess(asset, most_pairs);
         let last = target.pixels().last();
         (frame.slice_start, frame.is_first, frame.is_last) = (0, 1, last);
         frame.slice_splats = u32::MAX;
-        memory.in_slices = None;
+        memory.sliced_asset = None;
         loop {
-            memory.for_pairs(&self.device, wanted);
+            memory.reserve_pairs(&self.device, wanted);
             let slice = self.draw_slice(asset, camera, frame, depth_bits, memory, target)?;
             if slice.is_cut_short {
                 if frame.slice_splats == FEW {
-                    return Err(self.device.cuts_loops_short());
+                    return Err(self.device.loop_limit_error());
                 }
-                // Anew, in slices whose lists the driver goes through to the end.
+                // Start again, in slices whose lists are short enough for the driver.
                 frame.slice_splats = FEW;
-                memory.in_slices = Some(asset.id);
+                memory.sliced_asset = Some(asset.id);
                 (frame.slice_start, frame.is_first, frame.is_last) = (0, 1, 0);
                 continue;
             }
@@ -120,14 +120,14 @@ impl GpuRenderer {
                 return Ok(());
             }
             if frame.is_last != 0 {
-                // Nothing is drawn yet that counts: once more with room for all, or in slices. These grow: the first
-                // of them finish the pixels of what is opaque.
+                // The attempt is void: start again with room for all pairs, or in slices. These grow: the first ones
+                // finish the pixels of opaque surfaces.
                 let needed = u64::from(slice.pairs);
                 if needed <= most_pairs {
                     wanted = needed.next_power_of_two().min(most_pairs);
                 } else {
                     frame.is_last = 0;
-                    memory.in_slices = Some(asset.id);
+                    memory.sliced_asset = Some(asset.id);
                 }
                 continue;
             }
@@ -154,7 +154,7 @@ impl GpuRenderer {
         self.finish_slice(flight, memory, target)
     }
 
-    /// The stages, in their order.
+    /// Submits the stages of a slice, in their order.
     pub(super) fn submit_slice(
         &self,
         asset: &GpuAsset,
@@ -162,15 +162,15 @@ impl GpuRenderer {
         frame: &mut Frame,
         depth_bits: u32,
         memory: &mut Memory,
-        wanted_as: Pixels,
+        format: Pixels,
     ) -> Flight {
         let rows = Rows { first: frame.first_tile_row, count: frame.tile_rows };
-        let wanted = (frame.is_last != 0).then(|| wanted_as.part(pixels(camera, rows)));
-        let bytes = wanted.map_or(0, |[_, bytes]| bytes);
+        let part = (frame.is_last != 0).then(|| format.part(pixels(camera, rows)));
+        let bytes = part.map_or(0, |[_, bytes]| bytes);
         let readback = memory.readback(&self.device, bytes);
         let Memory { counters, gaussian: Some(per), pair: Some(pair), band: Some(band), .. } = &*memory
         else {
-            unreachable!("made before any slice");
+            unreachable!("allocated before any slice");
         };
         frame.pair_capacity = pair.tiles.capacity as u32;
         let queue = &self.device.queue;
@@ -179,19 +179,19 @@ impl GpuRenderer {
         queue.write_buffer(&counters.unfinished, 0, bytemuck::bytes_of(&0u32));
 
         let tiles = tiles(camera, rows.count);
-        let tile_bits = bits_of(tiles as u32);
+        let tile_bits = significant_bits(tiles as u32);
         let mut stages = Stages::new(&self.device, &self.kernels);
-        let splats_of = (asset.id, frame.of_splats());
-        if memory.splats_of != Some(splats_of) {
+        let splats_source = (asset.id, frame.splat_parameters());
+        if memory.splats_source != Some(splats_source) {
             stages.project(asset, counters, per);
             stages.sort_by_depth(counters, per, depth_bits);
         }
         stages.list_pairs(counters, per, pair, depth_bits, tiles);
         stages.sort_by_tile(per, pair, band, tile_bits);
         stages.blend(frame, counters, per, pair, band, tile_bits);
-        stages.read_back(counters, per, band, &readback, wanted);
+        stages.read_back(counters, per, band, &readback, part);
         let submission = stages.submit();
-        (memory.splats_of, memory.pairs_of) = (Some(splats_of), None);
+        (memory.splats_source, memory.pairs_source) = (Some(splats_source), None);
         memory.listings += 1;
         Flight {
             readback,
@@ -199,11 +199,11 @@ impl GpuRenderer {
             bytes,
             first_pixel: (rows.first * TILE) as usize * camera.width as usize,
             listing: memory.listings,
-            lists_of: (frame.slice_start == 0).then(|| (asset.id, frame.of_lists())),
+            pairs_source: (frame.slice_start == 0).then(|| (asset.id, frame.list_parameters())),
         }
     }
 
-    /// Waits for a slice; its pixels, if it was the last, are in the target then.
+    /// Waits for a slice. The last slice's pixels are then in the target.
     pub(super) fn finish_slice(
         &self,
         flight: Flight,
@@ -217,17 +217,17 @@ impl GpuRenderer {
         };
         let buffers = [(&flight.readback.numbers, NUMBERS), (&flight.readback.picture, flight.bytes)];
         self.device.read(flight.submission, &buffers[..if flight.bytes > 0 { 2 } else { 1 }], take)?;
-        memory.give_back(flight.readback);
+        memory.return_readback(flight.readback);
         let [pairs, end, unfinished] = numbers;
-        // Unless others were listed since.
+        // The lists are still there unless others have been made since.
         if memory.listings == flight.listing && end == u32::MAX {
-            memory.pairs_of = flight.lists_of.map(|of| (of, pairs));
+            memory.pairs_source = flight.pairs_source.map(|source| (source, pairs));
         }
         Ok(Slice { pairs, end, is_unfinished: unfinished & 1 != 0, is_cut_short: unfinished & 2 != 0 })
     }
 
-    /// Rows of tiles that a band may have.
-    pub(super) fn rows_of_a_band(&self, camera: &Camera) -> u32 {
+    /// Maximum number of rows of tiles in a band.
+    pub(super) fn rows_per_band(&self, camera: &Camera) -> u32 {
         let columns = u64::from(camera.width.div_ceil(TILE));
         let row_of_pixels = u64::from(camera.width) * u64::from(TILE);
         let pixels = self.bounds.pixels.min(self.bounds.binding / PIXEL);
@@ -243,36 +243,37 @@ pub(super) struct Rows {
     pub(super) count: u32,
 }
 
-/// A slice that the device is at.
+/// A submitted slice.
 pub(super) struct Flight {
     readback: Readback,
     submission: wgpu::SubmissionIndex,
-    /// Of the picture, that come back.
+    /// Bytes of the picture to be read back.
     bytes: u64,
     first_pixel: usize,
-    /// Which of `Memory::listings` it is, and whose lists they are if it begins with the first splat.
+    /// `Memory::listings` after this submission.
     listing: u64,
-    lists_of: Option<Made>,
+    /// Source of its lists, if the slice begins with the first splat.
+    pairs_source: Option<Source>,
 }
 
-/// How a slice went.
+/// The result of a slice.
 pub(super) struct Slice {
-    /// Those of all its splats, whether they fitted or not.
+    /// Number of pairs of all its splats, whether they fitted or not.
     pub(super) pairs: u32,
-    /// Rank of the first splat that is not in it, or `u32::MAX`.
+    /// Rank of the first splat beyond it, or `u32::MAX`.
     end: u32,
     is_unfinished: bool,
     is_cut_short: bool,
 }
 
 impl Slice {
-    /// Whether it was all there is to draw.
+    /// Whether it contained everything to draw.
     pub(super) fn is_whole(&self) -> bool {
         self.end == u32::MAX && !self.is_cut_short
     }
 }
 
-/// Room for pairs to begin with: one for each Gaussian, within bounds.
+/// Initial capacity for pairs: one for each Gaussian, within bounds.
 pub(super) fn first_guess(asset: &GpuAsset, most: u64) -> u64 {
     (asset.count as u64).next_power_of_two().clamp(MOST_TILES.min(most), most)
 }
@@ -281,14 +282,14 @@ pub(super) fn tiles(camera: &Camera, rows: u32) -> u64 {
     u64::from(camera.width.div_ceil(TILE)) * u64::from(rows)
 }
 
-/// Pixels in rows of tiles, of which the picture's last may be cut.
+/// Number of pixels in rows of tiles, of which the picture's last may be incomplete.
 pub(super) fn pixels(camera: &Camera, rows: Rows) -> u64 {
     let last = ((rows.first + rows.count) * TILE).min(camera.height);
     u64::from(camera.width) * u64::from(last - rows.first * TILE)
 }
 
 impl Pixels {
-    /// What `Frame::is_last` is of its last slice.
+    /// `Frame::is_last` of the last slice in this format.
     pub(super) fn last(self) -> u32 {
         match self {
             Self::Planes => 1,
@@ -296,11 +297,11 @@ impl Pixels {
         }
     }
 
-    /// Which bytes of a band's picture are wanted: from where, and how many.
+    /// Offset and number of the bytes of a band's picture that are read back.
     fn part(self, pixels: u64) -> [u64; 2] {
         match self {
             Self::Planes => [0, PIXEL * pixels],
-            // The plane of depth.
+            // Bytes are in the plane of depth.
             Self::Bytes => [16 * pixels, 4 * pixels],
         }
     }
@@ -327,7 +328,7 @@ impl Target<'_> {
         }
     }
 
-    /// A band's pixels from `first` on; planes come one after the other.
+    /// Writes a band's pixels from `first` on; its planes are stored one after the other.
     fn write(&mut self, first: usize, bytes: &[u8]) {
         match self {
             Self::Planes(picture) => {

@@ -1,4 +1,4 @@
-//! What kernels know of a picture: `Frame` of `shaders/frame.wgsl`.
+//! The kernels' parameters: `Frame` of `shaders/frame.wgsl`.
 
 use super::asset::{GpuAsset, coefficients};
 use crate::gaussians::sh;
@@ -6,7 +6,7 @@ use crate::render::view::PinholeView;
 use crate::render::{Background, DepthMode, RenderOptions};
 use vg_geometry::Camera;
 
-/// As `Frame` in the shaders, field by field.
+/// Equal to `Frame` in the shaders, field by field.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub(super) struct Frame {
@@ -29,7 +29,7 @@ pub(super) struct Frame {
     sh_coefficients: u32,
     antialiased: u32,
     expected_depth: u32,
-    nothing: u32,
+    opaque_zero: u32,
     pub(super) tile_columns: u32,
     pub(super) first_tile_row: u32,
     pub(super) tile_rows: u32,
@@ -43,15 +43,15 @@ pub(super) struct Frame {
     pub(super) band_row: u32,
     pub(super) first_pair: u32,
     pub(super) held_pairs: u32,
-    /// A structure's size is a multiple of its largest vector's.
+    /// Padding: a structure's size is a multiple of its largest vector's.
     spare: [u32; 3],
 }
 
-/// Pixels along a tile's side, as in the shaders.
+/// Pixels along a tile's side, equal to `TILE` in the shaders.
 pub(super) const TILE: u32 = 8;
 
 impl Frame {
-    /// With the whole picture as its band, and one slice. The depths are those that can occur.
+    /// Parameters with the whole picture as one band and one slice. `depths` are the bounds of those that can occur.
     pub(super) fn new(asset: &GpuAsset, camera: &Camera, options: &RenderOptions, depths: [f32; 2]) -> Self {
         let view = PinholeView::new(camera, options, asset.sh_degree);
         let i = view.intrinsics;
@@ -81,7 +81,7 @@ impl Frame {
             sh_coefficients: coefficients(asset, options.sh_degree) as u32,
             antialiased: u32::from(options.antialiased),
             expected_depth: u32::from(options.depth_mode == DepthMode::Expected),
-            nothing: 0,
+            opaque_zero: 0,
             tile_columns: camera.width.div_ceil(TILE),
             first_tile_row: 0,
             tile_rows: camera.height.div_ceil(TILE),
@@ -99,8 +99,8 @@ impl Frame {
         }
     }
 
-    /// What the lists of pairs of a whole window depend on.
-    pub(super) fn of_lists(&self) -> Self {
+    /// The parameters on which the lists of pairs of a whole window depend.
+    pub(super) fn list_parameters(&self) -> Self {
         Self {
             slice_start: 0,
             slice_splats: u32::MAX,
@@ -114,13 +114,19 @@ impl Frame {
         }
     }
 
-    /// What splats and their order depend on.
-    pub(super) fn of_splats(&self) -> Self {
-        Self { tile_columns: 0, first_tile_column: 0, first_tile_row: 0, tile_rows: 0, ..self.of_lists() }
+    /// The parameters on which the splats and their order depend.
+    pub(super) fn splat_parameters(&self) -> Self {
+        Self {
+            tile_columns: 0,
+            first_tile_column: 0,
+            first_tile_row: 0,
+            tile_rows: 0,
+            ..self.list_parameters()
+        }
     }
 }
 
-/// What f32 leaves of a number.
+/// The rounding error of a number in f32.
 fn rest(v: f64) -> f32 {
     (v - f64::from(v as f32)) as f32
 }

@@ -1,17 +1,18 @@
-//! Gradients: the picture's tiles are walked back on the device, which sums up what pixels have for each Gaussian; from
-//! there the CPU goes on, in f64, through the projection and the colour.
+//! Gradients: the device differentiates the picture's tiles and sums the pixels' gradients for each Gaussian; the CPU
+//! continues, in f64, with the projection and the colour.
 //!
-//! The way back needs all pairs of a tile at once. Where those of a band do not fit it is halved, down to single tiles;
-//! where the pairs' shares do not fit the walk is repeated for the next pairs. One walk is the rule.
+//! The backward pass needs all pairs of a tile at once. Where those of a band do not fit, the band is halved, down to
+//! single tiles; where the pairs' shares do not fit, the pass is repeated for the next pairs. Usually one pass is
+//! enough.
 
 use super::GpuRenderer;
 use super::asset::GpuAsset;
 use super::draw::{Rows, Target, first_guess, pixels, tiles};
 use super::frame::{Frame, TILE};
 use super::memory::{BACKGROUND, Memory, NUMBERS, PIXEL, SHARE, SUMS};
-use super::stages::{Stages, bits_of};
+use super::stages::{Stages, significant_bits};
 use crate::gaussians::Gaussians;
-use crate::render::cpu::backward::{Decided, Shares, SplatSums, scale_of};
+use crate::render::cpu::backward::{Decided, Shares, SplatSums, gradient_scale};
 use crate::render::{Background, Differentiable, Gradients, PictureGradient, RenderOptions, Rendered};
 use rayon::prelude::*;
 use vg_geometry::Camera;
@@ -29,7 +30,7 @@ impl Window {
         u64::from(self.rows.count) * u64::from(self.columns.count)
     }
 
-    /// Its halves, the first of them first; `None` of a single tile.
+    /// Its halves, in order; `None` for a single tile.
     fn halves(self) -> Option<[Self; 2]> {
         let cut = |r: Rows| {
             let half = r.count / 2;
@@ -46,7 +47,7 @@ impl Window {
 }
 
 impl GpuRenderer {
-    /// A picture, and the gradients of a loss of it, as
+    /// Renders a picture and computes the gradients of a loss of it, as
     /// [`CpuRenderer::render_with_gradients_into`](crate::render::CpuRenderer::render_with_gradients_into). The loss
     /// may use this renderer.
     ///
@@ -56,35 +57,43 @@ impl GpuRenderer {
         gaussians: &Gaussians,
         camera: &Camera,
         options: &RenderOptions,
-        (picture, of_picture, gradients): (&mut Rendered, &mut PictureGradient, &mut Gradients),
+        (picture, picture_gradient, gradients): (&mut Rendered, &mut PictureGradient, &mut Gradients),
         loss: impl FnOnce(&Rendered, &mut PictureGradient) -> Result<()>,
     ) -> Result<()> {
         camera.validate("camera")?;
         options.validate()?;
         let asset = self.upload(gaussians)?;
-        let largest = |picture: &Rendered, of_picture: &mut PictureGradient| {
-            of_picture.reset(picture);
-            loss(picture, of_picture)?;
-            of_picture.validate(camera)
+        let largest = |picture: &Rendered, picture_gradient: &mut PictureGradient| {
+            picture_gradient.reset(picture);
+            loss(picture, picture_gradient)?;
+            picture_gradient.validate(camera)
         };
         if camera.distortion.is_none() {
             self.draw(&asset, camera, options, Target::Planes(picture))?;
-            let largest = largest(picture, of_picture)?;
-            return self.back(&asset, gaussians, camera, options, (of_picture, largest), gradients);
+            let largest = largest(picture, picture_gradient)?;
+            return self.backward_pinhole(
+                &asset,
+                gaussians,
+                camera,
+                options,
+                (picture_gradient, largest),
+                gradients,
+            );
         }
         let map = self.lens_map(camera)?;
         let (pinhole, fine) = map.pinhole(camera, options);
-        let (mut fine_picture, mut of_fine) = (Rendered::default(), PictureGradient::default());
+        let (mut fine_picture, mut fine_gradient) = (Rendered::default(), PictureGradient::default());
         self.draw(&asset, &pinhole, &fine, Target::Planes(&mut fine_picture))?;
-        let background = map.loss(options, (&fine_picture, &mut of_fine), (picture, of_picture), largest)?;
-        let largest = of_fine.validate(&pinhole)?;
-        self.back(&asset, gaussians, &pinhole, &fine, (&of_fine, largest), gradients)?;
+        let background =
+            map.loss(options, (&fine_picture, &mut fine_gradient), (picture, picture_gradient), largest)?;
+        let largest = fine_gradient.validate(&pinhole)?;
+        self.backward_pinhole(&asset, gaussians, &pinhole, &fine, (&fine_gradient, largest), gradients)?;
         gradients.background = background;
         Ok(())
     }
 
-    /// Of a valid pinhole camera; `largest` is the largest magnitude in the gradient.
-    fn back(
+    /// Backward pass of a valid pinhole camera; `largest` is the largest magnitude in the gradient.
+    fn backward_pinhole(
         &self,
         asset: &GpuAsset,
         gaussians: &Gaussians,
@@ -93,11 +102,11 @@ impl GpuRenderer {
         (gradient, largest): (&PictureGradient, f32),
         out: &mut Gradients,
     ) -> Result<()> {
-        let scale = scale_of(largest);
+        let scale = gradient_scale(largest);
         let mut held = self.lock();
-        // What an error left is not to be trusted: it is taken, and put back when all went well.
+        // An error may leave the memory inconsistent, so it is taken out and put back only on success.
         let mut memory = held.take().unwrap_or_else(|| Memory::new(&self.device));
-        let mut background = self.back_bands(asset, camera, options, (gradient, scale), &mut memory)?;
+        let mut background = self.backward_bands(asset, camera, options, (gradient, scale), &mut memory)?;
         let (sums, flags) = self.read_sums(asset, &memory)?;
         *held = Some(memory);
         drop(held);
@@ -111,12 +120,12 @@ impl GpuRenderer {
             let has = |bit: u32| flags & bit != 0;
             Decided { pivot_x: has(1), color_moves: [has(2), has(4), has(8)] }
         };
-        self.cpu.back_to_gaussians(gaussians, camera, options, &shares, decided, out);
+        self.cpu.backward_to_gaussians(gaussians, camera, options, &shares, decided, out);
         Ok(())
     }
 
-    /// Leaves the Gaussians' sums on the device; returns the background's.
-    fn back_bands(
+    /// Computes the Gaussians' sums, which stay on the device; returns the background's gradient.
+    fn backward_bands(
         &self,
         asset: &GpuAsset,
         camera: &Camera,
@@ -126,11 +135,11 @@ impl GpuRenderer {
     ) -> Result<[f64; 3]> {
         let (mut frame, depth_bits) = self.frame(asset, camera, options, memory);
         let columns = Rows { first: 0, count: frame.tile_columns };
-        let (height, most) = (frame.tile_rows, self.rows_of_a_band(camera));
+        let (height, most) = (frame.tile_rows, self.rows_per_band(camera));
         let band_tiles = tiles(camera, most);
-        memory.for_band(&self.device, band_tiles, 1);
+        memory.reserve_band(&self.device, band_tiles, 1);
         let band_pixels = pixels(camera, Rows { first: 0, count: most });
-        memory.for_back(&self.device, asset.count, [band_tiles, band_pixels], self.bounds.binding);
+        memory.reserve_backward(&self.device, asset.count, [band_tiles, band_pixels], self.bounds.binding);
         self.clear_sums(memory);
 
         let mut background = [0.0; 3];
@@ -144,7 +153,7 @@ impl GpuRenderer {
             }
             let mut windows = vec![Window { rows, columns }];
             while let Some(window) = windows.pop() {
-                if let Some(share) = self.back_window(asset, &mut frame, window, depth_bits, memory)? {
+                if let Some(share) = self.backward_window(asset, &mut frame, window, depth_bits, memory)? {
                     for c in 0..3 {
                         background[c] += share[c];
                     }
@@ -156,9 +165,9 @@ impl GpuRenderer {
         Ok(background)
     }
 
-    /// What a window's tiles have for the background, once their shares are in the sums; `None` if their pairs do not fit,
-    /// and nothing is.
-    fn back_window(
+    /// Adds the shares of a window's tiles to the sums and returns their gradient of the background; `None`, with
+    /// nothing added, if their pairs do not fit.
+    fn backward_window(
         &self,
         asset: &GpuAsset,
         frame: &mut Frame,
@@ -168,15 +177,15 @@ impl GpuRenderer {
     ) -> Result<Option<[f64; 3]>> {
         (frame.first_tile_row, frame.tile_rows) = (window.rows.first, window.rows.count);
         (frame.first_tile_column, frame.tile_columns) = (window.columns.first, window.columns.count);
-        let tile_bits = bits_of(window.tiles() as u32);
-        // A splat has one pair in a tile: those of one tile fit.
+        let tile_bits = significant_bits(window.tiles() as u32);
+        // A splat has one pair in a tile, so the pairs of one tile fit.
         let most_pairs = self.bounds.pairs.max(asset.count as u64);
         let mut wanted = first_guess(asset, most_pairs);
         loop {
-            memory.for_pairs(&self.device, wanted);
+            memory.reserve_pairs(&self.device, wanted);
             let capacity = memory.pair.as_ref().map_or(0, |p| p.tiles.capacity);
             let most_shares = capacity.min(self.bounds.shares);
-            memory.for_shares(&self.device, most_shares, self.bounds.binding);
+            memory.reserve_shares(&self.device, most_shares, self.bounds.binding);
             memory.listings += 1;
             let readback = memory.readback(&self.device, 0);
             let Memory {
@@ -188,17 +197,18 @@ impl GpuRenderer {
                 ..
             } = &*memory
             else {
-                unreachable!("made before any window");
+                unreachable!("allocated before any window");
             };
             (frame.pair_capacity, frame.first_pair) = (capacity as u32, 0);
             frame.held_pairs = most_shares.min(back.shares.size() / SHARE) as u32;
-            let splats_of = (asset.id, frame.of_splats());
-            let lists_of = (asset.id, frame.of_lists());
-            let known = memory.pairs_of.filter(|(of, _)| *of == lists_of).map(|(_, pairs)| pairs);
+            let splats_source = (asset.id, frame.splat_parameters());
+            let pairs_source = (asset.id, frame.list_parameters());
+            let listed = memory.pairs_source.filter(|(source, _)| *source == pairs_source);
+            let known = listed.map(|(_, pairs)| pairs);
 
             self.device.queue.write_buffer(&counters.frame, 0, bytemuck::bytes_of(frame));
             let mut stages = Stages::new(&self.device, &self.kernels);
-            if memory.splats_of != Some(splats_of) {
+            if memory.splats_source != Some(splats_source) {
                 stages.project(asset, counters, per);
                 stages.sort_by_depth(counters, per, depth_bits);
             }
@@ -220,8 +230,8 @@ impl GpuRenderer {
             self.device.read(submission, &[(&readback.numbers, NUMBERS), backgrounds], take)?;
             let pairs = known.unwrap_or(numbers[0]);
             if pairs > frame.pair_capacity {
-                memory.give_back(readback);
-                (memory.splats_of, memory.pairs_of) = (Some(splats_of), None);
+                memory.return_readback(readback);
+                (memory.splats_source, memory.pairs_source) = (Some(splats_source), None);
                 if u64::from(pairs) > most_pairs {
                     return Ok(None);
                 }
@@ -235,12 +245,13 @@ impl GpuRenderer {
                 stages.back(frame, counters, per, pair, band, back, [depth_bits, tile_bits]);
                 stages.submit();
             }
-            memory.give_back(readback);
+            memory.return_readback(readback);
             let [r, g, b, is_cut_short] = background;
             if is_cut_short > 0.0 {
-                return Err(self.device.cuts_loops_short());
+                return Err(self.device.loop_limit_error());
             }
-            (memory.splats_of, memory.pairs_of) = (Some(splats_of), Some((lists_of, pairs)));
+            memory.splats_source = Some(splats_source);
+            memory.pairs_source = Some((pairs_source, pairs));
             return Ok(Some([r, g, b]));
         }
     }
@@ -253,7 +264,7 @@ impl GpuRenderer {
         }
     }
 
-    /// What pixels have for each Gaussian, and what the device decided about it.
+    /// Reads each Gaussian's sums over pixels, and the device's discrete decisions about it.
     fn read_sums(&self, asset: &GpuAsset, memory: &Memory) -> Result<(Vec<SplatSums>, Vec<f32>)> {
         let (mut sums, mut flags) = (vec![[0.0; 10]; asset.count], vec![0.0; asset.count]);
         let Some(back) = &memory.back else { return Ok((sums, flags)) };
@@ -264,15 +275,15 @@ impl GpuRenderer {
         let (mut first, mut is_cut_short) = (0, false);
         self.device.read(submission, &buffers, |i, bytes| {
             let chunk = first..first + back.sums[i].count;
-            let (of_sums, rest) = bytes.split_at(40 * chunk.len());
-            let (of_flags, of_loops) = rest.split_at(4 * chunk.len());
-            is_cut_short |= of_loops != [0; 4];
-            bytemuck::cast_slice_mut(&mut sums[chunk.clone()]).copy_from_slice(of_sums);
-            bytemuck::cast_slice_mut(&mut flags[chunk.clone()]).copy_from_slice(of_flags);
+            let (sum_bytes, rest) = bytes.split_at(40 * chunk.len());
+            let (flag_bytes, loop_bytes) = rest.split_at(4 * chunk.len());
+            is_cut_short |= loop_bytes != [0; 4];
+            bytemuck::cast_slice_mut(&mut sums[chunk.clone()]).copy_from_slice(sum_bytes);
+            bytemuck::cast_slice_mut(&mut flags[chunk.clone()]).copy_from_slice(flag_bytes);
             first = chunk.end;
         })?;
         if is_cut_short {
-            return Err(self.device.cuts_loops_short());
+            return Err(self.device.loop_limit_error());
         }
         Ok((sums, flags))
     }
@@ -292,12 +303,12 @@ impl Differentiable for GpuRenderer {
         let mut out = Gradients::default();
         if camera.distortion.is_none() {
             let asset = self.upload(gaussians)?;
-            self.back(&asset, gaussians, camera, options, (gradient, largest), &mut out)?;
+            self.backward_pinhole(&asset, gaussians, camera, options, (gradient, largest), &mut out)?;
             return Ok(out);
         }
-        // Resampling needs the picture anyway.
-        let (mut picture, mut of_picture) = (Rendered::default(), PictureGradient::default());
-        let targets = (&mut picture, &mut of_picture, &mut out);
+        // Resampling needs the picture in any case.
+        let (mut picture, mut picture_gradient) = (Rendered::default(), PictureGradient::default());
+        let targets = (&mut picture, &mut picture_gradient, &mut out);
         self.render_with_gradients_into(gaussians, camera, options, targets, |_, g| {
             g.clone_from(gradient);
             Ok(())
@@ -305,7 +316,7 @@ impl Differentiable for GpuRenderer {
         Ok(out)
     }
 
-    fn both_ways(
+    fn forward_backward(
         &self,
         gaussians: &Gaussians,
         camera: &Camera,
@@ -317,7 +328,7 @@ impl Differentiable for GpuRenderer {
     }
 }
 
-/// `scale` times the gradient of `count` pixels from row `first_row` on: red, green, blue, alpha, depth of each.
+/// Writes `scale` times the gradient of `count` pixels from row `first_row` on: red, green, blue, alpha, depth of each.
 fn stage(gradient: &PictureGradient, scale: f64, first_row: usize, count: usize, out: &mut Vec<f32>) {
     let first = first_row * gradient.width as usize;
     let PictureGradient { color, alpha, depth, .. } = gradient;
@@ -333,7 +344,7 @@ fn stage(gradient: &PictureGradient, scale: f64, first_row: usize, count: usize,
     });
 }
 
-/// Of tiles' backgrounds, in their order, and how many loops were left.
+/// Sums the tiles' gradients of the background, in their order, and counts those whose loop ended early.
 fn sum(bytes: &[u8]) -> [f64; 4] {
     let mut total = [0.0; 4];
     for tile in bytemuck::cast_slice::<u8, [f32; 4]>(bytes) {

@@ -1,8 +1,8 @@
-//! The stages as compiled programs, made once per device.
+//! The kernels of the stages, compiled once per device.
 
 use super::device::Device;
 
-/// Compute pipelines; the shaders are beside this file.
+/// Compute pipelines; the shaders are in `shaders`.
 #[derive(Debug)]
 pub(super) struct Kernels {
     pub(super) project: wgpu::ComputePipeline,
@@ -18,9 +18,9 @@ pub(super) struct Kernels {
     pub(super) gather: wgpu::ComputePipeline,
 }
 
-/// What several shaders begin with.
+/// Common part of all shaders.
 const FRAME: &str = include_str!("shaders/frame.wgsl");
-/// What both directions of blending begin with.
+/// Common part of forward and backward blending.
 const LAYERS: &str = include_str!("shaders/layers.wgsl");
 
 impl Kernels {
@@ -32,12 +32,12 @@ impl Kernels {
         let pipeline = |module: &wgpu::ShaderModule, entry_point: &str| {
             device.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(entry_point),
-                // Deduced: a stage's bindings stand in its shader and nowhere else.
+                // Deduced, so that a stage's bindings are declared only in its shader.
                 layout: None,
                 module,
                 entry_point: Some(entry_point),
                 compilation_options: wgpu::PipelineCompilationOptions {
-                    // Each kernel writes its own before it reads it.
+                    // Each kernel writes its workgroup memory before it reads it.
                     zero_initialize_workgroup_memory: false,
                     ..wgpu::PipelineCompilationOptions::default()
                 },

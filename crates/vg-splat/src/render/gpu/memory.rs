@@ -1,4 +1,4 @@
-//! Working memory on the device, kept from picture to picture and grown when one needs more.
+//! Working memory on the device, kept from picture to picture and grown as needed.
 
 use super::device::Device;
 use super::frame::Frame;
@@ -8,21 +8,21 @@ use bytemuck::Zeroable;
 const SCAN_BLOCK: u64 = 2048;
 /// Entries of a block of `shaders/sort.wgsl`.
 const SORT_BLOCK: u64 = 1024;
-/// Bits of a key that one pass of it sorts by.
+/// Bits of the key per pass of `shaders/sort.wgsl`.
 pub(super) const DIGIT_BITS: u32 = 4;
 
 /// A buffer of `bytes` that kernels read and write.
 pub(super) fn storage(device: &Device, label: &str, bytes: u64) -> wgpu::Buffer {
     device.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
-        // A binding may not be empty.
+        // A binding must not be empty.
         size: bytes.max(16).next_multiple_of(4),
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     })
 }
 
-/// A buffer of numbers that do not change while a kernel runs.
+/// A buffer of constants of a kernel.
 pub(super) fn uniform(device: &Device, label: &str, data: &[u8]) -> wgpu::Buffer {
     let buffer = device.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
@@ -34,7 +34,7 @@ pub(super) fn uniform(device: &Device, label: &str, data: &[u8]) -> wgpu::Buffer
     buffer
 }
 
-/// A buffer that the processor reads.
+/// A buffer that the CPU reads.
 fn readable(device: &Device, label: &str, bytes: u64) -> wgpu::Buffer {
     device.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
@@ -48,11 +48,12 @@ fn words(device: &Device, label: &str, count: u64) -> wgpu::Buffer {
     storage(device, label, 4 * count)
 }
 
-/// Numbers of 32 bits that are to be summed up, with room for the totals of each level.
+/// 32-bit numbers for a prefix sum, with buffers for the totals of each level.
 #[derive(Debug)]
 pub(super) struct Sums {
     pub(super) values: wgpu::Buffer,
-    /// Of the blocks of 2048, of the blocks of those, and so on; the last holds one number, the total of all.
+    /// Totals of the blocks of 2048, totals of blocks of those, and so on; the last holds one number, the overall
+    /// total.
     pub(super) levels: Vec<wgpu::Buffer>,
 }
 
@@ -63,7 +64,7 @@ impl Sums {
         let mut left = values.size() / 4;
         loop {
             left = left.div_ceil(SCAN_BLOCK);
-            // Exactly as many words as there are blocks: kernels go by the length of what they are given.
+            // Exactly one word per block: kernels use the length of their bindings.
             levels.push(device.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("totals"),
                 size: 4 * left,
@@ -76,9 +77,9 @@ impl Sums {
         }
     }
 
-    /// Where the total of all is.
+    /// The buffer with the overall total.
     pub(super) fn total(&self) -> &wgpu::Buffer {
-        // There is one level at least.
+        // There is at least one level.
         &self.levels[self.levels.len() - 1]
     }
 
@@ -87,7 +88,7 @@ impl Sums {
     }
 }
 
-/// Keys with values, twice: a pass sorts from one to the other.
+/// Two buffers of keys and values: a pass sorts from one to the other.
 #[derive(Debug)]
 pub(super) struct Entries {
     pub(super) keys: [wgpu::Buffer; 2],
@@ -121,37 +122,37 @@ impl Entries {
     }
 }
 
-/// What as many Gaussians as `depths` has room for need.
+/// Buffers for as many Gaussians as `depths` has capacity for.
 #[derive(Debug)]
 pub(super) struct PerGaussian {
     pub(super) splats: wgpu::Buffer,
     pub(super) tints: wgpu::Buffer,
-    /// By depth; the values are the splats' numbers.
+    /// Sort by depth; the values are the splats' indices.
     pub(super) depths: Entries,
-    /// By rank in depth: pairs before it. One more than there are splats.
+    /// Number of pairs before each depth rank; one more entry than there are splats.
     pub(super) offsets: Sums,
 }
 
-/// What as many (tile, splat) pairs as `tiles` has room for need.
+/// Buffers for as many (tile, splat) pairs as `tiles` has capacity for.
 #[derive(Debug)]
 pub(super) struct PerPair {
-    /// By tile; the values are the pairs' numbers.
+    /// Sort by tile; the values are the pairs' indices.
     pub(super) tiles: Entries,
-    /// Splat of each pair, by number.
-    pub(super) splats: wgpu::Buffer,
+    /// Splat of each pair.
+    pub(super) splat_from_pair: wgpu::Buffer,
 }
 
-/// What a band of so many tiles and pixels needs.
+/// Buffers for the tiles and pixels of a band.
 #[derive(Debug)]
 pub(super) struct PerBand {
     pub(super) ranges: wgpu::Buffer,
     pub(super) picture: wgpu::Buffer,
 }
 
-/// Where the processor reads what a slice left.
+/// Buffers from which the CPU reads the result of a slice.
 #[derive(Debug)]
 pub(super) struct Readback {
-    /// How many pairs there were, the slice's end, and whether a pixel is not finished.
+    /// The number of pairs, the slice's end, and whether a pixel is unfinished.
     pub(super) numbers: wgpu::Buffer,
     pub(super) picture: wgpu::Buffer,
 }
@@ -162,24 +163,24 @@ impl Readback {
     }
 }
 
-/// What the way back needs.
+/// Buffers of the backward pass.
 #[derive(Debug)]
 pub(super) struct Back {
-    /// Of a band's pixels, as many as it has room for.
+    /// Gradient of a band's pixels.
     pub(super) gradient: wgpu::Buffer,
-    /// Of a window's tiles.
+    /// Gradient of the background, from each tile of a window.
     pub(super) backgrounds: wgpu::Buffer,
     pub(super) backgrounds_readback: wgpu::Buffer,
-    /// Of pairs.
+    /// Each pair's contribution to its splat's sums.
     pub(super) shares: wgpu::Buffer,
     pub(super) sums: Vec<SplatSums>,
 }
 
-/// Sums of Gaussians that follow each other.
+/// Sums of consecutive Gaussians.
 #[derive(Debug)]
 pub(super) struct SplatSums {
     pub(super) count: usize,
-    /// Number of the first Gaussian, and the count.
+    /// Index of the first Gaussian, and the count.
     pub(super) range: wgpu::Buffer,
     pub(super) sums: wgpu::Buffer,
     pub(super) readback: wgpu::Buffer,
@@ -204,36 +205,36 @@ impl SplatSums {
     }
 }
 
-/// Numbers of which there is one.
+/// Buffers of a single value.
 #[derive(Debug)]
 pub(super) struct Counters {
     pub(super) frame: wgpu::Buffer,
-    /// How many Gaussians there are.
+    /// The number of Gaussians.
     pub(super) gaussians: wgpu::Buffer,
     /// Rank of the splat whose pairs did not fit, or `u32::MAX`.
     pub(super) slice_end: wgpu::Buffer,
-    /// Whether a pixel is not finished.
+    /// Whether a pixel is unfinished.
     pub(super) unfinished: wgpu::Buffer,
 }
 
-/// Bytes of what a slice says of itself.
+/// Bytes of `Readback::numbers`.
 pub(super) const NUMBERS: u64 = 12;
 /// Bytes of a pixel: colour, alpha, depth.
 pub(super) const PIXEL: u64 = 20;
 /// Bytes of a splat.
 pub(super) const SPLAT: u64 = 32;
-/// Bytes that a pair has for its splat: `shares` of `shaders/back.wgsl`.
+/// Bytes of a pair's contribution to its splat: `shares` of `shaders/back.wgsl`.
 pub(super) const SHARE: u64 = 40;
 /// Bytes of a splat's sums: `sums` of `shaders/gather.wgsl`.
 pub(super) const SUMS: u64 = 44;
 /// Bytes of a tile's gradient of the background.
 pub(super) const BACKGROUND: u64 = 16;
 
-/// What a frame is drawn of: the asset's id, and what of the frame matters.
-pub(super) type Made = (u64, Frame);
+/// The source of splats or lists: the asset's id, and the parameters on which they depend.
+pub(super) type Source = (u64, Frame);
 
-/// All of it. What is submitted is done in its order, so that one is enough for all that follows; but for what the
-/// processor reads, which it may come to after the next was submitted.
+/// All working memory. Submissions are executed in order, so they share one set of buffers, except for those that the
+/// CPU reads, possibly after the next submission.
 #[derive(Debug)]
 pub(super) struct Memory {
     pub(super) counters: Counters,
@@ -241,16 +242,16 @@ pub(super) struct Memory {
     pub(super) pair: Option<PerPair>,
     pub(super) band: Option<PerBand>,
     pub(super) back: Option<Back>,
-    /// Those that nobody is to read.
+    /// Readbacks not in use.
     readbacks: Vec<Readback>,
-    /// The asset whose last picture did not go in one slice.
-    pub(super) in_slices: Option<u64>,
-    /// Submissions that made lists of pairs.
+    /// The asset whose last picture did not fit in one slice.
+    pub(super) sliced_asset: Option<u64>,
+    /// The number of submissions that made lists of pairs.
     pub(super) listings: u64,
-    /// Whose splats are there, in their order.
-    pub(super) splats_of: Option<Made>,
-    /// Whose pairs are listed, all of a window's, and how many there are.
-    pub(super) pairs_of: Option<(Made, u32)>,
+    /// Source of the splats and their order, if they are valid.
+    pub(super) splats_source: Option<Source>,
+    /// Source of the pairs, if all those of a window are listed, and their number.
+    pub(super) pairs_source: Option<(Source, u32)>,
 }
 
 impl Memory {
@@ -268,19 +269,20 @@ impl Memory {
             band: None,
             back: None,
             readbacks: Vec::new(),
-            in_slices: None,
+            sliced_asset: None,
             listings: 0,
-            splats_of: None,
-            pairs_of: None,
+            splats_source: None,
+            pairs_source: None,
         }
     }
 
-    /// Room for the processor to read the numbers and so many bytes of a picture. It is given back when it was read.
+    /// Takes buffers for the CPU to read the numbers and this many bytes of a picture. The caller returns them after
+    /// reading.
     pub(super) fn readback(&mut self, device: &Device, bytes: u64) -> Readback {
         if let Some(i) = self.readbacks.iter().position(|r| r.picture.size() >= bytes) {
             return self.readbacks.swap_remove(i);
         }
-        // One that is too small goes first.
+        // Frees one that is too small first.
         self.readbacks.pop();
         Readback {
             numbers: readable(device, "numbers to read", NUMBERS),
@@ -288,19 +290,19 @@ impl Memory {
         }
     }
 
-    /// What [`Memory::readback`] lent.
-    pub(super) fn give_back(&mut self, readback: Readback) {
+    /// Returns the buffers that [`Memory::readback`] lent.
+    pub(super) fn return_readback(&mut self, readback: Readback) {
         self.readbacks.push(readback);
     }
 
-    /// Room for at least `count` Gaussians.
-    pub(super) fn for_gaussians(&mut self, device: &Device, count: u64) {
+    /// Reserves memory for at least `count` Gaussians.
+    pub(super) fn reserve_gaussians(&mut self, device: &Device, count: u64) {
         if self.gaussian.as_ref().is_some_and(|g| g.depths.capacity >= count) {
             return;
         }
-        // What was there goes first.
+        // The old buffers are freed first.
         self.gaussian = None;
-        (self.splats_of, self.pairs_of) = (None, None);
+        (self.splats_source, self.pairs_source) = (None, None);
         self.gaussian = Some(PerGaussian {
             splats: storage(device, "splats", SPLAT * count),
             tints: storage(device, "tints", 16 * count),
@@ -309,33 +311,33 @@ impl Memory {
         });
     }
 
-    /// Room for at least `count` pairs.
-    pub(super) fn for_pairs(&mut self, device: &Device, count: u64) {
+    /// Reserves memory for at least `count` pairs.
+    pub(super) fn reserve_pairs(&mut self, device: &Device, count: u64) {
         if self.pair.as_ref().is_some_and(|p| p.tiles.capacity >= count) {
             return;
         }
         self.pair = None;
-        self.pairs_of = None;
+        self.pairs_source = None;
         self.pair = Some(PerPair {
             tiles: Entries::new(device, "tiles", count),
-            splats: words(device, "pair splats", count),
+            splat_from_pair: words(device, "pair splats", count),
         });
     }
 
-    /// Room for a band of at least these sizes.
-    pub(super) fn for_band(&mut self, device: &Device, tiles: u64, pixels: u64) {
+    /// Reserves memory for a band of at least these sizes.
+    pub(super) fn reserve_band(&mut self, device: &Device, tiles: u64, pixels: u64) {
         let fits = |b: &PerBand| b.ranges.size() >= 8 * tiles && b.picture.size() >= PIXEL * pixels;
         if self.band.as_ref().is_some_and(fits) {
             return;
         }
         self.band = None;
-        self.pairs_of = None;
+        self.pairs_source = None;
         let picture = storage(device, "picture", PIXEL * pixels);
         self.band = Some(PerBand { ranges: storage(device, "ranges", 8 * tiles), picture });
     }
 
-    /// Room to go back with `count` Gaussians and at least so many tiles and pixels of a band.
-    pub(super) fn for_back(
+    /// Reserves memory for the backward pass of `count` Gaussians and at least this many tiles and pixels of a band.
+    pub(super) fn reserve_backward(
         &mut self,
         device: &Device,
         count: usize,
@@ -364,24 +366,25 @@ impl Memory {
         });
     }
 
-    /// Room for the shares of `pairs` of them, or of as many as fit in a binding, once there is room to go back.
-    pub(super) fn for_shares(&mut self, device: &Device, pairs: u64, largest_binding: u64) {
+    /// Reserves memory for the shares of `pairs` pairs, or of as many as fit in a binding, after
+    /// [`Memory::reserve_backward`].
+    pub(super) fn reserve_shares(&mut self, device: &Device, pairs: u64, largest_binding: u64) {
         let Some(back) = &mut self.back else { return };
         let bytes = SHARE * pairs.min(largest_binding / SHARE).max(1);
         if back.shares.size() < bytes {
-            // What was there goes first.
+            // The old buffer is freed first.
             back.shares.destroy();
             back.shares = storage(device, "shares", bytes);
         }
     }
 
-    /// What it takes on the device, bytes.
+    /// Memory on the device, bytes.
     pub(super) fn bytes(&self) -> u64 {
         let gaussian = self
             .gaussian
             .as_ref()
             .map_or(0, |g| g.splats.size() + g.tints.size() + g.depths.bytes() + g.offsets.bytes());
-        let pair = self.pair.as_ref().map_or(0, |p| p.tiles.bytes() + p.splats.size());
+        let pair = self.pair.as_ref().map_or(0, |p| p.tiles.bytes() + p.splat_from_pair.size());
         let band = self.band.as_ref().map_or(0, |b| b.ranges.size() + b.picture.size());
         let back = self.back.as_ref().map_or(0, Back::bytes);
         let readbacks: u64 = self.readbacks.iter().map(Readback::bytes).sum();

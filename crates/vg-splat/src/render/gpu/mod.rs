@@ -1,9 +1,10 @@
 //! The renderer on a graphics processor: the picture of [`CpuRenderer`], drawn by WGSL kernels through wgpu and Vulkan,
 //! without a window.
 //!
-//! `draw` has the stages of a picture in their order: `project` (one Gaussian a thread), sort by depth, list (tile,
-//! splat) pairs, sort by tile, `blend` (one pixel a thread); `gradients` those of the way back; `batch` keeps the device
-//! busy while pictures are read. Nothing depends on the order of threads: the same device draws the same bytes. `docs/GPU.md` has the measurements.
+//! `draw` has the stages of a picture in their order: `project` (one Gaussian per thread), sort by depth, list (tile,
+//! splat) pairs, sort by tile, `blend` (one pixel per thread); `gradients` has those of the backward pass; `batch`
+//! keeps the device busy while pictures are read. Nothing depends on the order of threads: the same device draws the
+//! same bytes. `docs/GPU.md` has the measurements.
 
 mod asset;
 mod batch;
@@ -29,51 +30,52 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use vg_geometry::Camera;
 use vg_geometry::{Error, Result};
 
-/// Bounds of what is held at a time; tests lower them.
+/// Bounds of working memory; tests lower them.
 #[derive(Clone, Copy, Debug)]
 #[doc(hidden)]
 pub struct Bounds {
-    /// (tile, splat) pairs: 640 MiB of them.
+    /// (tile, splat) pairs held at a time: 640 MiB.
     pub pairs: u64,
-    /// Pairs whose gradients are held: 320 MiB.
+    /// Pairs whose gradients are held at a time: 320 MiB.
     pub shares: u64,
-    /// Pixels of a band: 80 MiB, and as many to be read.
+    /// Pixels of a band: 80 MiB, and as much to read them back.
     pub pixels: u64,
-    /// Bytes of a buffer that a kernel is given.
+    /// Bytes of a buffer bound to a kernel.
     pub binding: u64,
 }
 
-/// Tiles of a band: their numbers have 16 bits.
+/// Maximum number of tiles in a band: their indices have 16 bits.
 const MOST_TILES: u64 = 1 << 16;
 
-/// Groups of threads that one command may start.
+/// Maximum number of workgroups in one dispatch.
 const MOST_GROUPS: u64 = 65_535;
 
-/// Gaussians of one asset: a thread for each and one more, in groups of 256.
+/// Maximum number of Gaussians in one asset: one thread each and one more, in groups of 256.
 const MOST_GAUSSIANS: u64 = 256 * MOST_GROUPS - 1;
 
-/// (tile, splat) pairs held at a time: what fits in the smallest binding that drivers allow, 128 MiB.
+/// Maximum number of (tile, splat) pairs held at a time: as many as fit in the smallest binding that drivers must
+/// allow, 128 MiB.
 const MOST_PAIRS: u64 = 1 << 25;
 
-/// Draws on a graphics processor. Device, kernels and working memory are made once and kept; may be shared between
-/// threads, which then draw one after the other.
+/// Renderer on a graphics processor. Device, kernels and working memory are created once and kept. It can be shared
+/// between threads, which then draw one after the other.
 #[derive(Debug)]
 pub struct GpuRenderer {
     device: Device,
     kernels: Kernels,
-    /// For what is not worth a kernel.
+    /// Computes the parts that are not worth a kernel.
     cpu: CpuRenderer,
     bounds: Bounds,
-    /// Held while the device is at work.
+    /// Locked while the device is working.
     memory: Mutex<Option<Memory>>,
-    /// Of the last lens drawn.
+    /// Map of the last lens drawn.
     lens: Mutex<Option<Arc<LensMap>>>,
 }
 
 impl GpuRenderer {
-    /// Opens a device and compiles the kernels for it: tens of milliseconds, more where the driver has not seen them.
+    /// Opens a device and compiles the kernels for it: tens of milliseconds, more where the driver has not cached them.
     ///
-    /// Errors: [`Error::Missing`] where there is no driver, none that `adapter` allows, or it cannot be opened.
+    /// Errors: [`Error::Missing`] without a driver, without a device that `adapter` allows, or if it cannot be opened.
     pub fn new(adapter: Adapter) -> Result<Self> {
         let device = Device::open(adapter)?;
         let kernels = Kernels::new(&device);
@@ -84,8 +86,8 @@ impl GpuRenderer {
         Ok(Self { device, kernels, cpu, bounds, memory: Mutex::default(), lens: Mutex::default() })
     }
 
-    /// The renderer that this process has open, or a new one: a device and its kernels are made once, for as long as
-    /// somebody holds them. One whose device was lost is not handed out again.
+    /// The renderer that this process has open, or a new one: a device and its kernels are created once and live as
+    /// long as a reference to them. A renderer whose device was lost is not returned again.
     ///
     /// Errors: those of [`GpuRenderer::new`].
     pub fn shared(adapter: Adapter) -> Result<Arc<Self>> {
@@ -99,7 +101,7 @@ impl GpuRenderer {
         Ok(renderer)
     }
 
-    /// The adapter's name, as its driver has it.
+    /// The adapter's name, as reported by its driver.
     pub fn name(&self) -> &str {
         &self.device.info.name
     }
@@ -109,17 +111,17 @@ impl GpuRenderer {
         self.device.is_software()
     }
 
-    /// The most Gaussians that one asset may have here.
+    /// The maximum number of Gaussians of one asset on this device.
     pub fn most_gaussians(&self) -> u64 {
         MOST_GAUSSIANS.min(self.bounds.binding / SPLAT)
     }
 
-    /// Working memory that is held on the device, bytes; assets are beside it.
+    /// Working memory on the device, bytes, without assets.
     pub fn working_bytes(&self) -> u64 {
         self.lock().as_ref().map_or(0, Memory::bytes)
     }
 
-    /// With lower bounds, for tests.
+    /// Changes the bounds, for tests.
     #[doc(hidden)]
     pub fn bounded(mut self, change: impl FnOnce(&mut Bounds)) -> Self {
         change(&mut self.bounds);
@@ -134,23 +136,23 @@ impl GpuRenderer {
 
     /// Copies Gaussians to the device, to be drawn any number of times by this renderer.
     ///
-    /// Errors: [`Error::Argument`] where there are more than [`most_gaussians`](GpuRenderer::most_gaussians),
-    /// [`Error::Missing`] where the device has no room or is lost.
+    /// Errors: [`Error::Argument`] for more than [`most_gaussians`](GpuRenderer::most_gaussians), [`Error::Missing`]
+    /// where the device is out of memory or lost.
     pub fn upload(&self, gaussians: &Gaussians) -> Result<GpuAsset> {
         let _held = self.lock();
         let (found, most) = (gaussians.len(), self.most_gaussians());
         if found as u64 > most {
-            let allowed = format!("0 to {most}, which {} has room for in one buffer", self.name());
-            return Err(Error::argument("gaussians", format!("{found} of them"), allowed));
+            let allowed = format!("0 to {most}, the limit of a buffer on {}", self.name());
+            return Err(Error::argument("gaussians", format!("{found} Gaussians"), allowed));
         }
         self.device.check()?;
         GpuAsset::upload(&self.device, gaussians, self.bounds.binding)
     }
 
-    /// One picture of Gaussians that this renderer has uploaded. The camera may be distorted.
+    /// Renders one picture of Gaussians that this renderer has uploaded. The camera may be distorted.
     ///
-    /// Errors: [`Error::Argument`] of the camera or the options, [`Error::Missing`] where the device is lost, out of
-    /// memory, or otherwise refuses.
+    /// Errors: [`Error::Argument`] for the camera or the options, [`Error::Missing`] where the device is lost, out of
+    /// memory, or fails.
     pub fn render_asset(
         &self,
         asset: &GpuAsset,
@@ -183,7 +185,7 @@ impl GpuRenderer {
         Ok(())
     }
 
-    /// As [`GpuRenderer::render_asset_into`] into the pixels of [`Rgba8`]: a fifth of the bytes come back from the device.
+    /// As [`GpuRenderer::render_asset_into`], into the pixels of [`Rgba8`]: a fifth of the bytes to transfer.
     pub fn render_asset_rgba8(
         &self,
         asset: &GpuAsset,
@@ -210,7 +212,7 @@ impl GpuRenderer {
     }
 
     fn lock(&self) -> MutexGuard<'_, Option<Memory>> {
-        // Whoever panicked had taken the memory out.
+        // A thread that panicked had taken the memory out.
         self.memory.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,4 +1,4 @@
-//! The stages of a picture as commands for the device.
+//! The stages of a picture, recorded as commands for the device.
 
 use super::MOST_GROUPS;
 use super::asset::GpuAsset;
@@ -9,32 +9,32 @@ use super::memory::{
     BACKGROUND, Back, Counters, DIGIT_BITS, Entries, PerBand, PerGaussian, PerPair, Readback, SUMS, Sums,
 };
 
-/// Commands on their way to the device.
+/// A recorder of commands for the device.
 pub(super) struct Stages<'a> {
     device: &'a Device,
     kernels: &'a Kernels,
     encoder: wgpu::CommandEncoder,
-    /// Open while kernels follow each other; copies end it.
+    /// The open compute pass; copies end it.
     pass: Option<wgpu::ComputePass<'static>>,
 }
 
-/// What a kernel is given: the binding's number in its shader, and the buffer.
+/// The number of a binding in the shader, and its buffer.
 type Binding<'b> = (u32, &'b wgpu::Buffer);
 
-/// As in `shaders/tiles.wgsl`.
+/// Equal to `PART` in `shaders/tiles.wgsl`.
 const PART: u64 = 32768;
 
-/// Bits in which numbers below `count` differ.
-pub(super) fn bits_of(count: u32) -> u32 {
+/// Number of bits in which numbers below `count` differ.
+pub(super) fn significant_bits(count: u32) -> u32 {
     u32::BITS - count.saturating_sub(1).leading_zeros()
 }
 
-/// Passes that sort so many bits: one at least, which leaves out what is not drawn.
+/// Number of passes that sort this many bits: at least one, which drops splats that are not drawn.
 fn passes(bits: u32) -> usize {
     bits.div_ceil(DIGIT_BITS).max(1) as usize
 }
 
-/// The sorted values: each pass goes from one buffer to the other.
+/// The buffer of sorted values: each pass goes from one buffer to the other.
 fn sorted(entries: &Entries, bits: u32) -> &wgpu::Buffer {
     &entries.values[passes(bits) % 2]
 }
@@ -45,7 +45,7 @@ impl<'a> Stages<'a> {
         Self { device, kernels, encoder, pass: None }
     }
 
-    /// Splats of the Gaussians, with the distance of their depth's bits from the smallest as keys.
+    /// Projects the Gaussians to splats, with the difference of their depth's bits from the smallest as keys.
     pub(super) fn project(&mut self, asset: &GpuAsset, counters: &Counters, per: &PerGaussian) {
         for chunk in &asset.chunks {
             let bindings = [
@@ -61,12 +61,12 @@ impl<'a> Stages<'a> {
         }
     }
 
-    /// The numbers of the splats that are drawn, in order of depth, of which so many bits differ.
+    /// Sorts the indices of the drawn splats by depth, in which `bits` bits differ.
     pub(super) fn sort_by_depth(&mut self, counters: &Counters, per: &PerGaussian, bits: u32) {
         self.sort(&per.depths, &counters.gaussians, bits);
     }
 
-    /// (tile, splat) pairs of the band in order of depth, from the slice's first splat on, as many as there is room for.
+    /// Lists the (tile, splat) pairs of the band in depth order, from the slice's first splat on, as many as fit.
     pub(super) fn list_pairs(
         &mut self,
         counters: &Counters,
@@ -75,16 +75,16 @@ impl<'a> Stages<'a> {
         depth_bits: u32,
         tiles: u64,
     ) {
-        let order = sorted(&per.depths, depth_bits);
+        let splat_from_rank = sorted(&per.depths, depth_bits);
         let drawn = per.depths.histogram.total();
         let bindings = [
             (0, &counters.frame),
             (1, drawn),
-            (2, order),
+            (2, splat_from_rank),
             (3, &per.splats),
             (4, &per.offsets.values),
             (5, &pair.tiles.keys[0]),
-            (6, &pair.splats),
+            (6, &pair.splat_from_pair),
             (7, &counters.slice_end),
         ];
         let ranks = per.offsets.values.size() / 4;
@@ -95,7 +95,7 @@ impl<'a> Stages<'a> {
         self.run(&self.kernels.emit, &bindings, [groups, tiles.div_ceil(PART) as u32]);
     }
 
-    /// The pairs by tile, nearest first, and where each tile's begin.
+    /// Sorts the pairs by tile, nearest first, and finds the range of each tile.
     pub(super) fn sort_by_tile(&mut self, per: &PerGaussian, pair: &PerPair, band: &PerBand, bits: u32) {
         self.sort(&pair.tiles, per.offsets.total(), bits);
         self.close();
@@ -120,7 +120,7 @@ impl<'a> Stages<'a> {
             (0, &counters.frame),
             (1, &band.ranges),
             (2, sorted(&pair.tiles, tile_bits)),
-            (3, &pair.splats),
+            (3, &pair.splat_from_pair),
             (4, &per.splats),
             (5, &per.tints),
             (6, &band.picture),
@@ -129,7 +129,7 @@ impl<'a> Stages<'a> {
         self.run(&self.kernels.blend, &bindings, [frame.tile_columns, frame.tile_rows]);
     }
 
-    /// Walks the window's tiles back, for the pairs that are held, and adds what they have for each splat to its sums.
+    /// Differentiates the window's tiles, for the pairs that are held, and adds their shares to each splat's sums.
     pub(super) fn back(
         &mut self,
         frame: &Frame,
@@ -144,7 +144,7 @@ impl<'a> Stages<'a> {
             (0, &counters.frame),
             (1, &band.ranges),
             (2, sorted(&pair.tiles, tile_bits)),
-            (3, &pair.splats),
+            (3, &pair.splat_from_pair),
             (4, &per.splats),
             (5, &per.tints),
             (6, &back.gradient),
@@ -169,14 +169,14 @@ impl<'a> Stages<'a> {
         }
     }
 
-    /// Makes ready for the processor what the window's tiles have for the background.
+    /// Copies the background's gradients of the window's tiles to where the CPU can read them.
     pub(super) fn read_backgrounds(&mut self, back: &Back, tiles: u64) {
         self.close();
         let to = &back.backgrounds_readback;
         self.encoder.copy_buffer_to_buffer(&back.backgrounds, 0, to, 0, BACKGROUND * tiles);
     }
 
-    /// Sums of zero.
+    /// Sets the sums to zero.
     pub(super) fn clear_sums(&mut self, back: &Back) {
         self.close();
         for chunk in &back.sums {
@@ -184,7 +184,7 @@ impl<'a> Stages<'a> {
         }
     }
 
-    /// Makes the sums ready for the processor.
+    /// Copies the sums to where the CPU can read them.
     pub(super) fn read_sums(&mut self, back: &Back) {
         self.close();
         for chunk in &back.sums {
@@ -193,8 +193,8 @@ impl<'a> Stages<'a> {
         }
     }
 
-    /// Makes ready for the processor how the slice went and, where it was the last, this part of the band's picture: from
-    /// which byte, and how many.
+    /// Copies the result of the slice and, of a last slice, this `part` (offset, bytes) of the band's picture to where
+    /// the CPU can read them.
     pub(super) fn read_back(
         &mut self,
         counters: &Counters,
@@ -213,13 +213,13 @@ impl<'a> Stages<'a> {
         }
     }
 
-    /// Hands everything to the device.
+    /// Submits the commands to the device.
     pub(super) fn submit(mut self) -> wgpu::SubmissionIndex {
         self.close();
         self.device.queue.submit([self.encoder.finish()])
     }
 
-    /// `entries` by the lowest `bits` of their keys, stably; the first pass leaves out what is not drawn.
+    /// Sorts `entries` by the lowest `bits` of their keys, stably; the first pass drops those that are not drawn.
     fn sort(&mut self, entries: &Entries, count: &wgpu::Buffer, bits: u32) {
         let groups = [entries.histogram.values.size() as u32 / 64, 1];
         let remaining = entries.histogram.total();
@@ -240,7 +240,7 @@ impl<'a> Stages<'a> {
         }
     }
 
-    /// The sums of what lies before each of `sums`' values, in their place.
+    /// Replaces each value by the sum of those before it.
     fn sum(&mut self, sums: &Sums) {
         let levels: Vec<&wgpu::Buffer> = std::iter::once(&sums.values).chain(&sums.levels).collect();
         let blocks = |level: usize| [(levels[level + 1].size() / 4) as u32, 1];

@@ -4,14 +4,14 @@ use super::{Term, check_target, share};
 use crate::render::{PictureGradient, Rendered};
 use vg_geometry::Result;
 
-/// Mean absolute difference of colour; its gradient is 0 where there is none. `target` `[height * width]` RGB.
+/// Mean absolute difference of colour; its gradient is 0 where the difference is 0. `target` `[height * width]` RGB.
 pub fn l1(
     picture: &Rendered,
     target: &[[f32; 3]],
     term: Term,
     gradient: &mut PictureGradient,
 ) -> Result<f64> {
-    // signum of 0 is 1.
+    // `signum` returns 1 for 0.
     let slope = |d: f64| if d == 0.0 { 0.0 } else { d.signum() };
     pixelwise(picture, target, term, gradient, f64::abs, slope)
 }

@@ -7,7 +7,7 @@ use vg_geometry::Result;
 /// Mean absolute difference of depth, metres, over the pixels where `target` is above 0: 0 means no measurement.
 /// `[height * width]`
 ///
-/// Of a picture with `DepthMode::Expected`; where nothing is drawn its depth is 0 and has no gradient.
+/// The picture must have `DepthMode::Expected`; where nothing is drawn its depth is 0 and has no gradient.
 pub fn depth_l1(
     picture: &Rendered,
     target: &[f32],

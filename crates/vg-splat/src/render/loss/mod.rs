@@ -1,20 +1,20 @@
 //! Loss terms of a picture, each with its gradient.
 //!
-//! A term is a mean over pixels, weighted by a mask where there is one: the same weight means the same for any size of
-//! picture. It returns `weight` times that mean and adds the gradient of what it returns to the picture's:
+//! A term is a mean over pixels, weighted by a mask where there is one, so a weight is independent of the picture's
+//! size. It returns `weight` times that mean and adds the gradient of the returned value to the picture's:
 //!
 //! ```
 //! # use vg_splat::render::{CpuRenderer, RenderOptions, loss::{self, Term}};
 //! # let (gaussians, camera) = (vg_splat::Gaussians::default(), vg_geometry::Camera::pinhole(16, 16,
 //! #     vg_geometry::Intrinsics { fx: 9.0, fy: 9.0, cx: 8.0, cy: 8.0 }, vg_geometry::Pose::IDENTITY)?);
 //! # let (photograph, mask) = (vec![[0.5; 3]; 256], vec![1.0; 256]);
-//! let (mut picture, mut of_picture, mut gradients) = Default::default();
+//! let (mut picture, mut picture_gradient, mut gradients) = Default::default();
 //! let mut value = 0.0;
 //! CpuRenderer::new().render_with_gradients_into(
 //!     &gaussians,
 //!     &camera,
 //!     &RenderOptions::default(),
-//!     (&mut picture, &mut of_picture, &mut gradients),
+//!     (&mut picture, &mut picture_gradient, &mut gradients),
 //!     |picture, gradient| {
 //!         value += loss::l1(picture, &photograph, Term::weighing(0.8), gradient)?;
 //!         value += loss::dissimilarity(picture, &photograph, Term::weighing(0.2), gradient)?;
@@ -38,28 +38,28 @@ pub use ssim::{Structure, dissimilarity};
 use crate::render::Rendered;
 use vg_geometry::{Error, Result};
 
-/// How much a term counts, and where.
+/// Weight and mask of a term.
 #[derive(Clone, Copy, Debug)]
 pub struct Term<'a> {
     /// Factor of the term and of its gradient.
     pub weight: f64,
-    /// What each pixel counts, 0 or more; all alike without. Only ratios matter, and a mask of zeros makes the term
-    /// zero. `[height * width]`
+    /// Weight of each pixel, 0 or more; all are equal without a mask. Only ratios matter, and a mask of zeros makes the
+    /// term zero. `[height * width]`
     pub mask: Option<&'a [f32]>,
 }
 
 impl<'a> Term<'a> {
-    /// Everywhere alike.
+    /// A term with this weight and no mask.
     pub fn weighing(weight: f64) -> Self {
         Self { weight, mask: None }
     }
 
-    /// Where `mask` says.
+    /// This term with `mask`.
     pub fn on(self, mask: &'a [f32]) -> Self {
         Self { mask: Some(mask), ..self }
     }
 
-    /// What pixel `i` counts.
+    /// Weight of pixel `i` by the mask.
     fn at(&self, i: usize) -> f64 {
         self.mask.map_or(1.0, |m| m[i].into())
     }
@@ -93,11 +93,11 @@ fn check_len(name: &str, found: usize, picture: &Rendered) -> Result<()> {
     Err(Error::argument(
         name,
         format!("{found} pixels"),
-        format!("{pixels} of a picture of {}x{}", picture.width, picture.height),
+        format!("{pixels} for a picture of {}x{}", picture.width, picture.height),
     ))
 }
 
-/// `values` `[pixels][channels]` of a picture's size and finite, or an error that names `name`.
+/// Checks that `values` `[pixels][channels]` have the picture's size and are finite; the error names `name`.
 fn check_target(name: &str, values: &[f32], channels: usize, picture: &Rendered) -> Result<()> {
     check_len(name, values.len() / channels, picture)?;
     match values.iter().position(|v| !v.is_finite()) {
@@ -109,7 +109,7 @@ fn check_target(name: &str, values: &[f32], channels: usize, picture: &Rendered)
     }
 }
 
-/// `weight / total`, or 0 where nothing counts.
+/// `weight / total`, or 0 where the total is 0.
 fn share(weight: f64, total: f64) -> f64 {
     if total > 0.0 { weight / total } else { 0.0 }
 }

@@ -4,10 +4,10 @@ use super::{Term, check_target, share};
 use crate::render::{PictureGradient, Rendered};
 use vg_geometry::Result;
 
-/// Mean square difference of alpha and `target`, 1 where the vehicle is and 0 where it is not. `[height * width]`
+/// Mean square difference of alpha and `target`, which is 1 on the vehicle and 0 elsewhere. `[height * width]`
 ///
-/// The square, not the cross-entropy: alpha is exactly 0 where nothing is drawn and at most 1 - 1e-4, and a logarithm
-/// would weigh these floors of the renderer as errors.
+/// It is the square, not the cross-entropy: alpha is exactly 0 where nothing is drawn and at most 1 - 1e-4, and a
+/// logarithm would count these limits of the renderer as errors.
 pub fn silhouette(
     picture: &Rendered,
     target: &[f32],

@@ -1,4 +1,4 @@
-//! 1 - SSIM, as `metrics::ssim` measures it, with its exact adjoint.
+//! 1 - SSIM, as `metrics::ssim` computes it, with its exact adjoint.
 
 use super::{Term, check_len, check_mask, check_target, check_weight, share};
 use crate::quality::{Reference, WINDOW};
@@ -8,9 +8,8 @@ use vg_geometry::{Error, Result};
 /// Structural dissimilarity: the mean of 1 - SSIM over channels and over pixels whose 11x11 window lies inside the
 /// picture, which the mask weighs by the window's middle. Without a mask it is 1 - [`crate::quality::ssim`].
 ///
-/// Colours are clamped to [0, 1] first, as a display would; outside there is no gradient. `target` `[height * width]`
-/// RGB; pictures smaller than the window are an error. Who compares many pictures with one target makes a
-/// [`Structure`] of it.
+/// Colours are clamped to [0, 1] first, as on a display; outside there is no gradient. `target` `[height * width]` RGB;
+/// pictures smaller than the window are an error. To compare many pictures with one target, make a [`Structure`] of it.
 pub fn dissimilarity(
     picture: &Rendered,
     target: &[[f32; 3]],
@@ -22,7 +21,7 @@ pub fn dissimilarity(
     structure.dissimilarity(picture, term.weight, gradient)
 }
 
-/// A target of [`dissimilarity`] with what it says alone, which is a third of the work.
+/// A target of [`dissimilarity`] with precomputed windows, which saves a third of the work.
 #[derive(Clone, Debug)]
 pub struct Structure {
     size: [u32; 2],
@@ -33,10 +32,10 @@ pub struct Structure {
 }
 
 impl Structure {
-    /// `target` `[height * width]` RGB of `[width, height]`; `mask` as in [`Term`].
+    /// Prepares `target` `[height * width]` RGB of `[width, height]`; `mask` as in [`Term`].
     ///
     /// # Errors
-    /// Numbers that are not finite, arrays of other sizes, and pictures smaller than the window.
+    /// A number is not finite, an array has another size, or the picture is smaller than the window.
     pub fn new(target: &[[f32; 3]], [width, height]: [u32; 2], mask: Option<Vec<f32>>) -> Result<Self> {
         let picture = Rendered { width, height, ..Rendered::default() };
         check_target("target", target.as_flattened(), 3, &picture)?;
@@ -60,7 +59,7 @@ impl Structure {
         Ok(Self { size: [width, height], reference: Reference::new(target, w, h), mask, total })
     }
 
-    /// As [`dissimilarity`] of this target and its mask, times `weight`.
+    /// Computes [`dissimilarity`] for this target and its mask, times `weight`.
     pub fn dissimilarity(
         &self,
         picture: &Rendered,

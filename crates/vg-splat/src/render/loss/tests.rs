@@ -1,4 +1,4 @@
-//! Every term against central differences of its own value, and its contract.
+//! Every term's gradient against central differences of its value, and its contract.
 
 use super::*;
 use crate::render::PictureGradient;
@@ -8,7 +8,7 @@ type Loss<'a> = &'a dyn Fn(&Rendered, Term, &mut PictureGradient) -> Result<f64>
 const W: usize = 17;
 const H: usize = 14;
 
-/// In [low, high), the same on every machine.
+/// Pseudorandom numbers in [low, high), equal on every machine.
 fn noise(n: usize, seed: usize, low: f32, high: f32) -> Vec<f32> {
     let at = |i: usize| ((i * 7919 + seed * 104_729 + (i * i) % 613 * 31) % 10_007) as f32 / 10_007.0;
     (0..n).map(|i| low + (high - low) * at(i)).collect()
@@ -21,7 +21,7 @@ fn rgb(seed: usize, low: f32, high: f32) -> Vec<[f32; 3]> {
 fn picture() -> Rendered {
     let n = W * H;
     let mut color = rgb(1, -0.1, 1.2);
-    // Clear of 0 and 1, where a clamped colour has its kinks.
+    // Away from 0 and 1, where a clamped colour has kinks.
     for v in color.as_flattened_mut() {
         if v.abs() < 0.01 || (*v - 1.0).abs() < 0.01 {
             *v += 0.03;
@@ -42,8 +42,8 @@ fn zeros() -> PictureGradient {
     g
 }
 
-/// Value and gradient of `loss`, whose gradient is compared with differences of fourth order at every number of the
-/// planes it looks at.
+/// Compares the gradient of `loss` with fourth-order differences of its value at every number of the planes that it
+/// uses.
 fn check(name: &str, loss: Loss, planes: [bool; 3], mask: Option<&[f32]>) {
     let term = Term { weight: 0.7, mask };
     let mut gradient = zeros();
@@ -51,7 +51,7 @@ fn check(name: &str, loss: Loss, planes: [bool; 3], mask: Option<&[f32]>) {
     assert!(value > 0.0, "{name}");
     let lens = [gradient.color.len(), gradient.alpha.len(), gradient.depth.len()];
     assert_eq!(lens.map(|n| n > 0), planes, "{name}");
-    // 2^-10: f32 colours and depths move by it exactly enough.
+    // 2^-10: f32 colours and depths change by it with negligible rounding.
     let h = 1.0 / 1024.0;
     let at = |plane: usize, i: usize, step: f32| {
         let mut p = picture();
@@ -101,7 +101,7 @@ fn every_terms_gradient_is_its_central_difference_with_a_mask_and_without() {
     }
 }
 
-/// `target`, kept clear of `values`, where an absolute difference has its kink; zeros stay.
+/// `target`, moved away from `values`, where an absolute difference has its kink; zeros stay.
 fn away(target: &[f32], values: &[f32]) -> Vec<f32> {
     let clear = |(t, v): (&f32, &f32)| if *t != 0.0 && (t - v).abs() < 0.01 { t + 0.02 } else { *t };
     target.iter().zip(values).map(clear).collect()
@@ -145,7 +145,7 @@ fn terms_add_up_and_a_mask_of_zeros_makes_a_term_zero() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_by_name() {
+fn arguments_of_another_size_or_not_finite_are_refused_by_name() {
     let (picture, target) = (picture(), rgb(5, 0.0, 1.0));
     let mut bad = target.clone();
     bad[3][2] = f32::NAN;

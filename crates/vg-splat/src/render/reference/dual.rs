@@ -1,8 +1,8 @@
-//! Numbers the projection is written in: f64, or f64 with its derivatives (forward mode).
+//! Number types of the projection: f64, or f64 with its derivatives (forward mode).
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// What a formula needs of a number.
+/// Operations that the projection needs.
 pub(super) trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
@@ -25,7 +25,7 @@ impl Number for f64 {
     }
 }
 
-/// A value and its derivative by each of N variables.
+/// A value and its derivatives by N variables.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Dual<const N: usize> {
     pub(super) value: f64,

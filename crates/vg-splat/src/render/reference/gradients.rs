@@ -1,4 +1,4 @@
-//! Gradients of the reference picture: blending by the textbook's suffix sums, the projection by dual numbers.
+//! Gradients of the reference picture: blending by textbook suffix sums, the projection by dual numbers.
 
 use super::blend::{Cuts, falloff};
 use super::dual::{Dual, Number};
@@ -10,7 +10,7 @@ use crate::render::{Background, DepthMode, Gradients, PictureGradient, PoseGradi
 use glam::{DMat3, DVec3};
 use vg_geometry::{Camera, Pose};
 
-/// As [`Gradients`], in f64.
+/// [`Gradients`] in f64.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReferenceGradients {
     /// `[n][3]`
@@ -25,27 +25,27 @@ pub struct ReferenceGradients {
     pub sh: Vec<f64>,
     /// Zero for a transparent background.
     pub background: [f64; 3],
-    /// Of the entries of `camera_from_vehicle`, all free; the last row is zero.
+    /// Gradient of the entries of `camera_from_vehicle`, all free; the last row is zero.
     pub view_matrix: [[f64; 4]; 4],
 }
 
 impl ReferenceGradients {
-    /// The six numbers of [`PoseGradient`], from the entries of the matrix.
+    /// Converts the gradient of the matrix to a [`PoseGradient`].
     pub fn pose(&self, camera: &Camera) -> PoseGradient {
         let m = &self.view_matrix;
         let pose: Pose = camera.vehicle_from_camera;
         let row = |r: usize| DVec3::new(m[r][0], m[r][1], m[r][2]);
-        let of_rotation = DMat3::from_cols(row(0), row(1), row(2)).transpose();
-        let of_translation = DVec3::new(m[0][3], m[1][3], m[2][3]);
+        let d_rotation = DMat3::from_cols(row(0), row(1), row(2)).transpose();
+        let d_translation = DVec3::new(m[0][3], m[1][3], m[2][3]);
         let r = pose.rotation.transpose();
         let t = -(r * pose.translation);
         // The camera's motion (w, v) makes R -> R - [w] R, t -> t - [w] t - v.
-        let turn = of_rotation * pose.rotation
-            + DMat3::from_cols(of_translation * t.x, of_translation * t.y, of_translation * t.z);
+        let turn = d_rotation * pose.rotation
+            + DMat3::from_cols(d_translation * t.x, d_translation * t.y, d_translation * t.z);
         let at = |row: usize, column: usize| turn.col(column)[row];
         PoseGradient {
             rotation: DVec3::new(at(1, 2) - at(2, 1), at(2, 0) - at(0, 2), at(0, 1) - at(1, 0)),
-            translation: -of_translation,
+            translation: -d_translation,
             view_matrix: *m,
         }
     }
@@ -73,32 +73,32 @@ struct Upstream {
     color: [f64; 3],
 }
 
-/// Mean, rotation, scale, opacity, `[R | t]`.
+/// Number of variables: mean, rotation, scale, opacity, `[R | t]`.
 const VARIABLES: usize = 3 + 4 + 3 + 1 + 12;
 
 pub(super) fn backward(
-    of: &Parameters,
+    parameters: &Parameters,
     options: &RenderOptions,
     gradient: &PictureGradient,
 ) -> ReferenceGradients {
-    let splats = of.project(options);
-    let cuts = Cuts::new(of, options);
-    let mut upstream = vec![Upstream::default(); of.means.len()];
+    let splats = parameters.project(options);
+    let cuts = Cuts::new(parameters, options);
+    let mut upstream = vec![Upstream::default(); parameters.means.len()];
     let mut background = [0.0; 3];
     for i in 0..cuts.layers.len() {
-        let behind = blend(of, options, &splats, &cuts, i, gradient, &mut upstream);
+        let behind = blend(parameters, options, &splats, &cuts, i, gradient, &mut upstream);
         for c in 0..3 {
             background[c] += behind[c];
         }
     }
     let mut out = ReferenceGradients {
-        sh: vec![0.0; of.sh.len()],
+        sh: vec![0.0; parameters.sh.len()],
         background: if options.background == Background::Transparent { [0.0; 3] } else { background },
         ..ReferenceGradients::default()
     };
     let mut view = [[0.0; 4]; 3];
     for (i, g) in upstream.iter().enumerate() {
-        let by = through_projection(of, options, i, g, &mut out.sh);
+        let by = through_projection(parameters, options, i, g, &mut out.sh);
         out.means.push([by[0], by[1], by[2]]);
         out.rotations.push([by[3], by[4], by[5], by[6]]);
         out.scales.push([by[7], by[8], by[9]]);
@@ -110,16 +110,16 @@ pub(super) fn backward(
     // p = R m + t_0 with t = t_0 + R origin.
     for row in 0..3 {
         for column in 0..3 {
-            out.view_matrix[row][column] = view[row][column] + view[row][3] * of.origin[column];
+            out.view_matrix[row][column] = view[row][column] + view[row][3] * parameters.origin[column];
         }
         out.view_matrix[row][3] = view[row][3];
     }
     out
 }
 
-/// One pixel: adds to the Gaussians' gradients and returns the background's.
+/// Differentiates one pixel: adds to the Gaussians' gradients and returns the background's.
 fn blend(
-    of: &Parameters,
+    parameters: &Parameters,
     options: &RenderOptions,
     splats: &[Option<Projected<f64>>],
     cuts: &Cuts,
@@ -127,14 +127,14 @@ fn blend(
     gradient: &PictureGradient,
     upstream: &mut [Upstream],
 ) -> [f64; 3] {
-    let of_color = gradient.color.get(pixel).map_or([0.0; 3], |c| c.map(f64::from));
-    let mut of_alpha = gradient.alpha.get(pixel).map_or(0.0, |&a| a.into());
-    let mut of_depth = gradient.depth.get(pixel).map_or(0.0, |&d| d.into());
+    let d_color = gradient.color.get(pixel).map_or([0.0; 3], |c| c.map(f64::from));
+    let mut d_alpha = gradient.alpha.get(pixel).map_or(0.0, |&a| a.into());
+    let mut d_depth = gradient.depth.get(pixel).map_or(0.0, |&d| d.into());
     let layers = &cuts.layers[pixel];
     let alphas: Vec<f64> = layers
         .iter()
         .map(|l| match (&splats[l.gaussian], l.clamped) {
-            (Some(s), false) => s.opacity * falloff(s, pixel, of.width).1,
+            (Some(s), false) => s.opacity * falloff(s, pixel, parameters.width).1,
             _ => f64::from(options.max_alpha),
         })
         .collect();
@@ -147,28 +147,28 @@ fn blend(
     }
     if options.depth_mode == DepthMode::Expected {
         let covered = 1.0 - transmittance;
-        of_depth = if covered > 0.0 { of_depth / covered } else { 0.0 };
-        of_alpha -= if covered > 0.0 { of_depth * depth / covered } else { 0.0 };
+        d_depth = if covered > 0.0 { d_depth / covered } else { 0.0 };
+        d_alpha -= if covered > 0.0 { d_depth * depth / covered } else { 0.0 };
     }
-    let dot = |c: [f64; 3]| of_color[0] * c[0] + of_color[1] * c[1] + of_color[2] * c[2];
-    let shown = if options.background == Background::Transparent { [0.0; 3] } else { of.background };
-    // sum of T alpha phi behind the layer at hand, with the background's.
-    let mut behind = transmittance * (dot(shown) - of_alpha);
+    let dot = |c: [f64; 3]| d_color[0] * c[0] + d_color[1] * c[1] + d_color[2] * c[2];
+    let shown = if options.background == Background::Transparent { [0.0; 3] } else { parameters.background };
+    // Sum of T alpha phi behind the current layer, with the background's.
+    let mut behind = transmittance * (dot(shown) - d_alpha);
     for (k, l) in layers.iter().enumerate().rev() {
         let Some(s) = &splats[l.gaussian] else { continue };
         let (alpha, t) = (alphas[k], before[k]);
-        let phi = dot(s.color) + of_depth * s.depth;
+        let phi = dot(s.color) + d_depth * s.depth;
         let g = &mut upstream[l.gaussian];
         for c in 0..3 {
-            g.color[c] += t * alpha * of_color[c];
+            g.color[c] += t * alpha * d_color[c];
         }
-        g.depth += t * alpha * of_depth;
+        g.depth += t * alpha * d_depth;
         let by_alpha = t * phi - behind / (1.0 - alpha);
         behind += t * alpha * phi;
         if l.clamped {
             continue;
         }
-        let ([dx, dy], e) = falloff(s, pixel, of.width);
+        let ([dx, dy], e) = falloff(s, pixel, parameters.width);
         g.opacity += by_alpha * e;
         let by_sigma = -by_alpha * alpha;
         g.conic[0] += by_sigma * 0.5 * dx * dx;
@@ -177,12 +177,12 @@ fn blend(
         g.center[0] -= by_sigma * (s.conic[0] * dx + s.conic[1] * dy);
         g.center[1] -= by_sigma * (s.conic[1] * dx + s.conic[2] * dy);
     }
-    of_color.map(|g| g * transmittance)
+    d_color.map(|g| g * transmittance)
 }
 
-/// Through the projection of Gaussian `i`; adds to the gradient of its coefficients in `sh`.
+/// Differentiates the projection of Gaussian `i`; adds to the gradient of its coefficients in `sh`.
 fn through_projection(
-    of: &Parameters,
+    parameters: &Parameters,
     options: &RenderOptions,
     i: usize,
     g: &Upstream,
@@ -190,14 +190,14 @@ fn through_projection(
 ) -> [f64; VARIABLES] {
     let variable = |value: f64, k: usize| Dual::<VARIABLES>::variable(value, k);
     let v = Variables {
-        mean: [0, 1, 2].map(|k| variable(of.means[i][k], k)),
-        rotation: [0, 1, 2, 3].map(|k| variable(of.rotations[i][k], 3 + k)),
-        scale: [0, 1, 2].map(|k| variable(of.scales[i][k], 7 + k)),
-        opacity: variable(of.opacities[i], 10),
-        view: [0, 1, 2].map(|r| [0, 1, 2, 3].map(|k| variable(of.view[r][k], 11 + 4 * r + k))),
+        mean: [0, 1, 2].map(|k| variable(parameters.means[i][k], k)),
+        rotation: [0, 1, 2, 3].map(|k| variable(parameters.rotations[i][k], 3 + k)),
+        scale: [0, 1, 2].map(|k| variable(parameters.scales[i][k], 7 + k)),
+        opacity: variable(parameters.opacities[i], 10),
+        view: [0, 1, 2].map(|r| [0, 1, 2, 3].map(|k| variable(parameters.view[r][k], 11 + 4 * r + k))),
     };
-    let Some(s) = project(of, i, &v, options) else { return [0.0; VARIABLES] };
-    let stride = 3 * sh::coefficients(of.sh_degree);
+    let Some(s) = project(parameters, i, &v, options) else { return [0.0; VARIABLES] };
+    let stride = 3 * sh::coefficients(parameters.sh_degree);
     for k in 0..stride / 3 {
         for c in 0..3 {
             sh[i * stride + 3 * k + c] = if s.shown[c] { g.color[c] * s.basis[k] } else { 0.0 };

@@ -1,8 +1,8 @@
-//! The definition of a right picture: method section 5 in f64, every pixel against every Gaussian, and its gradients.
+//! The reference renderer: method section 5 in f64, every pixel against every Gaussian, and its gradients.
 //!
-//! It shares no formula with the fast renderer: the covariance is multiplied out, its inverse is the plain conic
-//! (which in f64 has digits to spare), the order is a library sort, and the projection is differentiated by dual
-//! numbers. Minutes for a large scene; for tests.
+//! It shares no formula with the fast renderer: the covariance is multiplied out, its inverse is the plain conic (f64
+//! has digits to spare), the order is a library sort, and the projection is differentiated by dual numbers. It is for
+//! tests, and takes minutes for a large scene.
 
 mod blend;
 mod dual;
@@ -24,12 +24,12 @@ use vg_geometry::{Camera, Intrinsics};
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Reference;
 
-/// A picture with every digit that was computed.
+/// A picture in f64.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReferencePicture {
-    /// Columns.
+    /// Width, pixels.
     pub width: u32,
-    /// Rows.
+    /// Height, pixels.
     pub height: u32,
     /// RGB. `[height * width]`
     pub color: Vec<[f64; 3]>,
@@ -39,12 +39,12 @@ pub struct ReferencePicture {
     pub depth: Vec<f64>,
 }
 
-/// Everything a picture is made of, in f64: what finite differences move.
+/// Everything that a picture is drawn from, in f64, so that finite differences can vary it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameters {
-    /// Metres. `[n][3]`
+    /// Centres, metres. `[n][3]`
     pub means: Vec<[f64; 3]>,
-    /// (w, x, y, z) of any norm. `[n][4]`
+    /// Quaternions (w, x, y, z) of any norm. `[n][4]`
     pub rotations: Vec<[f64; 4]>,
     /// Standard deviations, metres. `[n][3]`
     pub scales: Vec<[f64; 3]>,
@@ -52,10 +52,10 @@ pub struct Parameters {
     pub opacities: Vec<f64>,
     /// `[n][(sh_degree + 1)^2][3]`
     pub sh: Vec<f64>,
-    /// Not looked at where the options' is transparent.
+    /// Background colour, ignored where the options have a transparent background.
     pub background: [f64; 3],
     sh_degree: u8,
-    /// Where the camera was; differences to it are taken first, so that a distant camera costs no digits.
+    /// The original position of the camera; it is subtracted first, so that a distant camera loses no digits.
     origin: [f64; 3],
     /// `[R | t]`, `p_camera = R (p_vehicle - origin) + t`.
     view: [[f64; 4]; 3],
@@ -65,7 +65,7 @@ pub struct Parameters {
 }
 
 impl Parameters {
-    /// Of a pinhole camera (distortion is ignored); camera and options are validated.
+    /// The parameters for a pinhole camera (distortion is ignored); camera and options are validated.
     pub fn new(gaussians: &Gaussians, camera: &Camera, options: &RenderOptions) -> Result<Self> {
         camera.validate("camera")?;
         options.validate()?;
@@ -90,7 +90,7 @@ impl Parameters {
         })
     }
 
-    /// Adds `step` to an entry of `camera_from_vehicle`, row 0 to 2, the others as they are.
+    /// Adds `step` to one entry of `camera_from_vehicle`, row 0 to 2.
     pub fn move_view(&mut self, row: usize, column: usize, step: f64) {
         self.view[row][column] += step;
         if column < 3 {
@@ -98,13 +98,13 @@ impl Parameters {
         }
     }
 
-    /// Coefficients of Gaussian `i`.
-    fn sh_of(&self, i: usize) -> &[f64] {
+    /// SH coefficients of Gaussian `i`.
+    fn coefficients(&self, i: usize) -> &[f64] {
         let stride = 3 * crate::gaussians::sh::coefficients(self.sh_degree);
         &self.sh[i * stride..(i + 1) * stride]
     }
 
-    /// Every Gaussian on the image plane, `None` where it is not between near and far.
+    /// Projects every Gaussian to the image plane; `None` where it is not between near and far.
     fn project(&self, options: &RenderOptions) -> Vec<Option<Projected<f64>>> {
         let variables = |i: usize| Variables {
             mean: self.means[i],
@@ -118,7 +118,7 @@ impl Parameters {
 }
 
 impl Reference {
-    /// One picture in f64 of a pinhole camera (distortion is ignored); camera and options are validated.
+    /// Renders one picture of a pinhole camera in f64 (distortion is ignored); camera and options are validated.
     pub fn render_f64(
         &self,
         gaussians: &Gaussians,
@@ -129,8 +129,8 @@ impl Reference {
         Ok(blend::picture(&parameters, options))
     }
 
-    /// Gradients in f64 of a pinhole camera (distortion is ignored), of the loss whose gradient with respect to the
-    /// picture is `gradient`.
+    /// Computes gradients in f64 for a pinhole camera (distortion is ignored), of the loss whose gradient with respect
+    /// to the picture is `gradient`.
     pub fn backward_f64(
         &self,
         gaussians: &Gaussians,
@@ -143,12 +143,12 @@ impl Reference {
         Ok(gradients::backward(&parameters, options, gradient))
     }
 
-    /// What is drawn where, with which alphas clamped: all that finite differences have to leave as it is.
+    /// The layers drawn in each pixel and which of their alphas are clamped: finite differences must keep these fixed.
     pub fn cuts(&self, parameters: &Parameters, options: &RenderOptions) -> Cuts {
         Cuts::new(parameters, options)
     }
 
-    /// The picture of moved `parameters` with the cuts of others: a smooth function.
+    /// Renders `parameters` with the cuts of others, which makes the picture a smooth function of the parameters.
     pub fn render_with_cuts(
         &self,
         parameters: &Parameters,

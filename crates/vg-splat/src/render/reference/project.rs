@@ -1,5 +1,5 @@
-//! One Gaussian on the image plane, by the textbook: covariance multiplied out, its inverse as adjugate over
-//! determinant (which in f64 has digits to spare), in any kind of number.
+//! Textbook projection of one Gaussian to the image plane: covariance multiplied out, its inverse as adjugate over
+//! determinant (f64 has digits to spare), in any type of number.
 
 use super::Parameters;
 use super::dual::Number;
@@ -15,13 +15,13 @@ pub(super) struct Projected<T> {
     pub(super) conic: [T; 3],
     pub(super) opacity: T,
     pub(super) color: [T; 3],
-    /// Values of the basis functions, for the coefficients' gradients; of those beyond the degree zero.
+    /// Values of the basis functions, for the coefficients' gradients; zero beyond the degree.
     pub(super) basis: [f64; 16],
-    /// Whether each colour is above its cut at zero.
+    /// Whether each channel is above its clamp at zero.
     pub(super) shown: [bool; 3],
 }
 
-/// A Gaussian and the view it is seen in.
+/// The variables of a projection: a Gaussian and the view.
 pub(super) struct Variables<T> {
     pub(super) mean: [T; 3],
     pub(super) rotation: [T; 4],
@@ -31,16 +31,16 @@ pub(super) struct Variables<T> {
     pub(super) view: [[T; 4]; 3],
 }
 
-/// Gaussian `i` with its variables given, or `None` where its centre is not between near and far.
+/// Projects Gaussian `i` with the given variables; `None` where its centre is not between near and far.
 pub(super) fn project<T: Number>(
-    of: &Parameters,
+    parameters: &Parameters,
     i: usize,
     v: &Variables<T>,
     options: &RenderOptions,
 ) -> Option<Projected<T>> {
     let number = |x: f64| T::constant(x);
     let row = |r: usize| [v.view[r][0], v.view[r][1], v.view[r][2]];
-    let from_origin = [0, 1, 2].map(|k| v.mean[k] - number(of.origin[k]));
+    let from_origin = [0, 1, 2].map(|k| v.mean[k] - number(parameters.origin[k]));
     let p = [0, 1, 2].map(|r| dot(row(r), from_origin) + v.view[r][3]);
     if !(p[2].value() > f64::from(options.near) && p[2].value() < f64::from(options.far)) {
         return None;
@@ -60,8 +60,8 @@ pub(super) fn project<T: Number>(
     let half = [0, 1, 2].map(|r| [0, 1, 2].map(|k| dot(row(r), column(k)) * v.scale[k]));
     let covariance = [0, 1, 2].map(|a| [0, 1, 2].map(|b| dot(half[a], half[b])));
 
-    // J of the pinhole at (x', y', z), the ray clamped to the image and 15 % around it.
-    let k = of.intrinsics;
+    // J of the pinhole at (x', y', z), with the ray clamped to the image and 15 % around it.
+    let k = parameters.intrinsics;
     let clamped = |ratio: T, f: f64, c: f64, size: u32| {
         let margin = f64::from(PROJECTION_MARGIN) * f64::from(size);
         let (low, high) = ((0.0 - c - margin) / f, (f64::from(size) - c + margin) / f);
@@ -73,8 +73,8 @@ pub(super) fn project<T: Number>(
     };
     let (ratio_x, ratio_y) = (p[0] / p[2], p[1] / p[2]);
     let (fx, fy, zero) = (number(k.fx), number(k.fy), number(0.0));
-    let row_x = [fx / p[2], zero, -fx * clamped(ratio_x, k.fx, k.cx, of.width) / p[2]];
-    let row_y = [zero, fy / p[2], -fy * clamped(ratio_y, k.fy, k.cy, of.height) / p[2]];
+    let row_x = [fx / p[2], zero, -fx * clamped(ratio_x, k.fx, k.cx, parameters.width) / p[2]];
+    let row_y = [zero, fy / p[2], -fy * clamped(ratio_y, k.fy, k.cy, parameters.height) / p[2]];
     let form =
         |a: [T; 3], b: [T; 3]| dot(a, [dot(covariance[0], b), dot(covariance[1], b), dot(covariance[2], b)]);
     let (a, b, c) = (form(row_x, row_x), form(row_x, row_y), form(row_y, row_y));
@@ -82,7 +82,7 @@ pub(super) fn project<T: Number>(
     let blur = number(f64::from(options.blur));
     let (blurred_a, blurred_c) = (a + blur, c + blur);
     let mut determinant = blurred_a * blurred_c - b * b;
-    // The blur's own determinant is the smallest that can be; rounding may not go below it.
+    // The blur's own determinant is the lower bound; rounding must not go below it.
     if determinant.value() < (blur * blur).value() {
         determinant = blur * blur;
     }
@@ -94,17 +94,17 @@ pub(super) fn project<T: Number>(
         opacity = opacity * compensation;
     }
 
-    // Colour is seen from -R^T (t - R origin), which is the origin where R is a rotation and t zero.
-    let origin = of.origin.map(number);
+    // Colour is seen from -R^T (t - R origin), which is the origin where R is a rotation and t is zero.
+    let origin = parameters.origin.map(number);
     let turned = [0, 1, 2].map(|r| dot(row(r), origin) - v.view[r][3]);
     let d = [0, 1, 2].map(|k| {
         let back = v.view[0][k] * turned[0] + v.view[1][k] * turned[1] + v.view[2][k] * turned[2];
         from_origin[k] + (origin[k] - back)
     });
     let length = dot(d, d).sqrt();
-    let degree = options.sh_degree.min(of.sh_degree);
+    let degree = options.sh_degree.min(parameters.sh_degree);
     let basis = basis([d[0] / length, d[1] / length, d[2] / length], degree);
-    let sh = of.sh_of(i);
+    let sh = parameters.coefficients(i);
     let mut color = [number(0.5); 3];
     for (k, y) in basis.iter().enumerate().take(sh.len() / 3) {
         for ch in 0..3 {
@@ -132,7 +132,7 @@ fn dot<T: Number>(a: [T; 3], b: [T; 3]) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Real spherical harmonics in 3DGS's order and signs, as `gaussians::sh::basis`; zero above `degree`.
+/// Real spherical harmonics in the order and signs of 3DGS, as `gaussians::sh::basis`; zero above `degree`.
 fn basis<T: Number>([x, y, z]: [T; 3], degree: u8) -> [T; 16] {
     let c = |v: f64| T::constant(v);
     let mut b = [c(0.0); 16];

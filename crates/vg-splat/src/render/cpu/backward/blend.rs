@@ -1,16 +1,16 @@
-//! Blending backwards: one tile's tape, from the farthest layer to the nearest.
+//! Backward pass of blending: one tile's tape, from the farthest layer to the nearest.
 //!
 //! Every output of a pixel is a sum over its layers, `sum_k T_k alpha_k f_k + T_end f_end`, with f the colour, z or 1.
 //! Weighted by the picture's gradient (gc, ga, gd) they are one sum, of `phi_k = gc . c_k + gd z_k` before
-//! `phi_end = gc . background - ga`. With S_k what is seen of it from layer k on, composited from the back,
+//! `phi_end = gc . background - ga`. With S_k its part from layer k on, composited from the back,
 //!
 //! ```text
 //! S_k = alpha_k phi_k + (1 - alpha_k) S_{k+1},   S_end = phi_end
 //! dL/dalpha_k = T_k (phi_k - S_{k+1}),   dL/dc_k = T_k alpha_k gc,   dL/dz_k = T_k alpha_k gd
 //! ```
 //!
-//! without a division. (The usual form recovers T by dividing by 1 - alpha and subtracts sums.) Expected depth D/A is
-//! D with `gd / A` and a background at depth D/A, as `d(D/A) = (dD - D/A dA) / A`.
+//! without a division. (The usual form recovers T by dividing by 1 - alpha and subtracts sums.) Expected depth D/A is D
+//! with `gd / A` and a background at depth D/A, because `d(D/A) = (dD - D/A dA) / A`.
 
 use super::super::blend::block_centers;
 use super::super::simd::Lanes;
@@ -20,15 +20,15 @@ use super::tape::Tape;
 use crate::render::{Background, DepthMode, PictureGradient, RenderOptions};
 use pulp::f32x8;
 
-/// What one tile contributes to the gradient of one splat, summed over pixels with
-/// `w = alpha dL/dalpha = dL/d(log alpha)`, zero where alpha is clamped, and (t, s) the offset from the splat's
-/// centre whitened by the form of [`Splat`]: exponent `q = t^2 + s^2`, t along the axis that is not the pivot.
-/// Where a pixel is drawn q < 8, so all of these are of the size of w.
+/// One tile's contribution to the gradient of one splat, summed over pixels with
+/// `w = alpha dL/dalpha = dL/d(log alpha)`, zero where alpha is clamped, and (t, s) the offset from the splat's centre
+/// whitened by the form of [`Splat`]: exponent `q = t^2 + s^2`, t along the axis that is not the pivot. Where a pixel
+/// is drawn q < 8, so all of these have the magnitude of w.
 ///
 /// `[w, w t, w s, w t t, w t s, w s s, red, green, blue, depth]`
 pub(in crate::render) type SplatSums = [f32; 10];
 
-/// The gradient of eight pixels, and what lies behind the layer at hand.
+/// The gradient of eight pixels, and the composite behind the current layer.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 struct Behind {
@@ -42,7 +42,7 @@ struct Behind {
 
 const ZERO: f32x8 = f32x8(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
 
-/// A tile's pixels going backwards.
+/// The state of a tile's pixels in the backward pass.
 #[derive(Debug)]
 pub(super) struct TileGradient {
     blocks: [Behind; BLOCKS * TILE_HEIGHT],
@@ -53,8 +53,8 @@ impl TileGradient {
         Self { blocks: [Behind { color: [ZERO; 3], depth: ZERO, sum: ZERO }; BLOCKS * TILE_HEIGHT] }
     }
 
-    /// Starts behind the last layer of `tile`, which has been blended onto `tape`, with `scale` times the picture's gradient.
-    /// Returns the gradient of the background's colour.
+    /// Starts behind the last layer of `tile`, which has been blended onto `tape`, with `scale` times the picture's
+    /// gradient. Returns the gradient of the background's colour.
     #[inline(always)]
     pub(super) fn start(
         &mut self,
@@ -122,7 +122,7 @@ impl TileGradient {
         if options.background == Background::Transparent { [0.0; 3] } else { background }
     }
 
-    /// Walks `tape` back to front; appends the splats that drew and what they are due.
+    /// Walks `tape` from back to front; appends the splats that were drawn and their sums.
     #[inline(always)]
     pub(super) fn walk<S: Lanes>(
         &mut self,
@@ -137,8 +137,8 @@ impl TileGradient {
         let x = block_centers(left);
         let max_alpha = simd.splat_f32s(max_alpha);
         let one = simd.splat_f32s(1.0);
-        for i in (0..tape.layers().len()).rev() {
-            let layer = tape.layers()[i];
+        for layer_index in (0..tape.layers().len()).rev() {
+            let layer = tape.layers()[layer_index];
             let splat = &splats[layer.splat as usize];
             let form = Form::new(splat);
             let center_x = simd.splat_f32s(form.center[0]);
@@ -153,11 +153,11 @@ impl TileGradient {
             ];
             let depth = simd.splat_f32s(splat.depth);
             let mut sum = [ZERO; 10];
-            let (drawn, blocks) = tape.records(i);
-            for (drawn, &at) in drawn.iter().zip(blocks) {
-                let at = usize::from(at);
-                let (row, column) = (at / BLOCKS, at % BLOCKS);
-                // The offset's coordinates, as the blend computed them.
+            let (drawn, blocks) = tape.records(layer_index);
+            for (drawn, &block) in drawn.iter().zip(blocks) {
+                let block = usize::from(block);
+                let (row, column) = (block / BLOCKS, block % BLOCKS);
+                // The offset's coordinates, computed as by the blend.
                 let dy = ((top + row) as f32 + 0.5 - form.center[1]) - form.center_rest[1];
                 let offset = simd.splat_f32s(form.slope[1] * dy);
                 let s_y = simd.splat_f32s(form.whiten_s[1] * dy);
@@ -165,13 +165,13 @@ impl TileGradient {
                 let t = simd.mul_f32s(whiten_t, simd.mul_add(slope_x, dx, offset));
                 let s = simd.mul_add(whiten_s_x, dx, s_y);
 
-                let behind = &mut self.blocks[at];
+                let behind = &mut self.blocks[block];
                 let alpha = drawn.alpha;
                 let mut phi = simd.mul_f32s(behind.depth, depth);
                 for c in 0..3 {
                     phi = simd.mul_add(behind.color[c], color[c], phi);
                 }
-                // Zero where nothing was drawn, as alpha is.
+                // Zero where nothing was drawn, because alpha is.
                 let weight = simd.mul_f32s(drawn.transmittance, alpha);
                 let w = simd.mul_f32s(weight, simd.sub_f32s(phi, behind.sum));
                 let w = simd.select_f32s(simd.less_than_f32s(alpha, max_alpha), w, ZERO);
@@ -201,7 +201,7 @@ impl TileGradient {
     }
 }
 
-/// Beyond this many pixels from the picture the square of an offset could leave f32.
+/// Distance from the picture, pixels, beyond which the square of an offset could leave f32.
 const FARTHEST_CENTER: f32 = 1e15;
 
 /// A splat's exponent as whitened coordinates, linear in the offset (dx, dy).
@@ -221,7 +221,7 @@ impl Form {
         let (t, marginal) = (s.conditional.abs().sqrt(), s.marginal.sqrt());
         let near = s.center[0].abs().max(s.center[1].abs()) < FARTHEST_CENTER;
         if !near || !t.is_finite() {
-            // Drawn as it may be; its shape and place get no gradient.
+            // The splat is drawn, but its shape and place get no gradient.
             return Self {
                 center: [0.0; 2],
                 center_rest: [0.0; 2],

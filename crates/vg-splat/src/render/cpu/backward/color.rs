@@ -1,11 +1,11 @@
-//! Spherical harmonics backwards: to the coefficients, and through the direction to where things are.
+//! Backward pass of spherical harmonics: to the coefficients, and through the direction to the positions.
 
 use crate::render::gradient::narrow;
 
 /// Writes the gradient of the coefficients `sh` `[coefficients][3]`, `unscale` times `gradient` times each basis
 /// function, and returns dL/d(direction) of the polynomials, not scaled and not yet projected onto the sphere.
 ///
-/// `direction` is unit; `gradient` is dL/d(colour), already zero where the colour is cut.
+/// `direction` is a unit vector; `gradient` is dL/d(colour), already zero where the colour is clamped.
 #[inline(always)]
 pub(super) fn backward(
     sh: &[f32],
@@ -75,7 +75,7 @@ mod tests {
     use crate::gaussians::sh;
 
     #[test]
-    fn the_turn_of_every_basis_function_is_its_central_difference() {
+    fn the_derivative_of_every_basis_function_is_its_central_difference() {
         let d = glam::DVec3::new(0.48, -0.6, 0.64).to_array();
         for k in 0..16 {
             let mut one = [0.0; 48];

@@ -1,9 +1,9 @@
-//! The backward pass: from the gradient of a picture to that of the Gaussians, the background and the pose.
+//! The backward pass: from the gradient of a picture to those of the Gaussians, the background and the pose.
 //!
-//! Stages: `blend` replays each tile onto its `tape` and walks it back, `sum` adds up what the tiles have for each
-//! splat, `project` goes back through the projection and the colour. The splats, their order and the lists of tiles
-//! are those of the forward pass. Everything is summed in an order that the picture decides, tile by tile and chunk by
-//! chunk: the same bytes for any number of threads.
+//! Stages: `blend` replays each tile onto its `tape` and differentiates it from back to front, `sum` adds the tiles'
+//! gradients for each splat, `project` differentiates the projection and the colour. The splats, their order and the
+//! lists of tiles are those of the forward pass. The order of summation, tile by tile and chunk by chunk, depends only
+//! on the picture, so the bytes are the same for any number of threads.
 
 mod blend;
 mod color;
@@ -30,35 +30,35 @@ use tape::Tape;
 use vg_geometry::Camera;
 use vg_geometry::progress::Watch;
 
-/// (tile, splat) pairs whose gradients are held at a time: 184 MB if all of them draw.
+/// Maximum number of (tile, splat) pairs whose gradients are held at a time: 184 MB if all of them draw.
 const PAIR_BUDGET: u64 = 1 << 22;
 
-/// The picture's gradient is brought to this magnitude, exactly, by a power of two: with colours of at most 1e30 and
-/// 8192 x 8192 pixels no sum leaves f32, and entries 1e-30 of the largest still count.
+/// Magnitude to which the picture's gradient is scaled by a power of two, which is exact: with colours of at most 1e30
+/// and 8192 x 8192 pixels no sum leaves f32, and entries 1e-30 of the largest still contribute.
 const LARGEST: f64 = 1.0 / (1 << 24) as f64;
 
 /// Wall time of each stage of one backward pass.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BackwardTimes {
-    /// Replaying the tiles and walking back.
+    /// Replaying and differentiating the tiles.
     pub blend: Duration,
-    /// Adding up the tiles' shares.
+    /// Adding the tiles' shares.
     pub sum: Duration,
-    /// Projection and colour.
+    /// Differentiating projection and colour.
     pub project: Duration,
 }
 
-/// Arrays that outlive a picture.
+/// Working memory, reused from picture to picture.
 #[derive(Debug, Default)]
 pub(super) struct BackwardScratch {
     tiles: Vec<TileShare>,
     /// `[n]`
     sums: Vec<SplatSums>,
-    /// One per thread at work.
+    /// Spare workers, at most one per thread.
     workers: Mutex<Vec<Box<Worker>>>,
 }
 
-/// What one tile has for the splats that drew in it, farthest first.
+/// One tile's contribution to the gradients of the splats drawn in it, farthest first.
 #[derive(Debug, Default)]
 struct TileShare {
     splats: Vec<u32>,
@@ -66,7 +66,7 @@ struct TileShare {
     background: [f64; 3],
 }
 
-/// What a thread needs for a tile.
+/// Working memory of a thread for one tile.
 #[derive(Debug)]
 struct Worker {
     tile: Tile,
@@ -74,8 +74,8 @@ struct Worker {
     gradient: TileGradient,
 }
 
-/// Of what has been projected and sorted into `scratch`; `binned` says that its stripes list the whole picture.
-/// `largest` is the largest magnitude in `gradient`. Of stopped work `out` holds nothing in particular.
+/// Computes the gradients of the splats projected and sorted into `scratch`; `binned` means that its stripes list the
+/// whole picture. `largest` is the largest magnitude in `gradient`. After a stop the contents of `out` are unspecified.
 pub(super) fn backward<S: Lanes>(
     simd: S,
     gaussians: &Gaussians,
@@ -88,21 +88,21 @@ pub(super) fn backward<S: Lanes>(
     (gradient, largest): (&PictureGradient, f32),
     out: &mut Gradients,
 ) -> BackwardTimes {
-    let scale = scale_of(largest);
+    let scale = gradient_scale(largest);
     let grid = Grid::new(camera.width, camera.height);
-    let Scratch { splats, order, bounds, stripes, backward, .. } = scratch;
+    let Scratch { splats, splat_from_rank, bounds_from_rank, stripes, backward, .. } = scratch;
     let BackwardScratch { tiles, sums, workers } = backward;
     sums.clear();
     sums.resize(gaussians.len(), [0.0; 10]);
 
     let mut times = BackwardTimes::default();
     let mut background = [0.0; 3];
-    let windows = bin::windows(grid, bounds, pair_budget.min(PAIR_BUDGET));
+    let windows = bin::windows(grid, bounds_from_rank, pair_budget.min(PAIR_BUDGET));
     let whole = windows.len() == 1;
     for window in windows {
         let start = Instant::now();
         if !(whole && binned) {
-            bin::bin(&window, order, bounds, stripes);
+            bin::bin(&window, splat_from_rank, bounds_from_rank, stripes);
         }
         walk_tiles(simd, &window, stripes, splats, options, gradient, scale, watch, workers, tiles);
         if watch.is_stopped() {
@@ -121,22 +121,30 @@ pub(super) fn backward<S: Lanes>(
 
     let start = Instant::now();
     let shares = Shares { sums, background, scale };
-    back_to_gaussians(simd, gaussians, camera, options, &shares, |i| Decided::of(&splats[i]), out);
+    backward_to_gaussians(
+        simd,
+        gaussians,
+        camera,
+        options,
+        &shares,
+        |i| Decided::from_splat(&splats[i]),
+        out,
+    );
     times.project = start.elapsed();
     times
 }
 
-/// What pixels have for Gaussians and the background: dL/d(what they show).
+/// Gradients summed over pixels, for each splat and the background.
 pub(in crate::render) struct Shares<'a> {
     /// `[n]`
     pub(in crate::render) sums: &'a [SplatSums],
     pub(in crate::render) background: [f64; 3],
-    /// The picture's gradient was brought to this multiple.
+    /// Factor by which the picture's gradient was scaled.
     pub(in crate::render) scale: f64,
 }
 
-/// From pixels to what made them: through the projection and the colour of each Gaussian that drew.
-pub(super) fn back_to_gaussians<S: Lanes>(
+/// Differentiates the projection and the colour of each Gaussian that was drawn.
+pub(super) fn backward_to_gaussians<S: Lanes>(
     simd: S,
     gaussians: &Gaussians,
     camera: &Camera,
@@ -152,13 +160,13 @@ pub(super) fn back_to_gaussians<S: Lanes>(
     out.pose = pose_gradient(camera, &total);
 }
 
-/// The power of two that brings `largest` to about [`LARGEST`].
-pub(in crate::render) fn scale_of(largest: f32) -> f64 {
+/// The power of two that scales `largest` to about [`LARGEST`].
+pub(in crate::render) fn gradient_scale(largest: f32) -> f64 {
     let ratio = if largest > 0.0 { LARGEST / f64::from(largest) } else { 1.0 };
     f64::from_bits(ratio.to_bits() & 0xfff0_0000_0000_0000)
 }
 
-/// Replays every tile of `window` and walks it back.
+/// Replays and differentiates every tile of `window`.
 fn walk_tiles<S: Lanes>(
     simd: S,
     window: &Window,
@@ -179,7 +187,7 @@ fn walk_tiles<S: Lanes>(
         }
         let (row, column) = (window.rows.start + i / columns, window.columns.start + i % columns);
         let origin = [column * TILE_WIDTH, row * TILE_HEIGHT];
-        let list = bin::stripe_of(stripes, row).tile(column, row);
+        let tile_entries = bin::stripe_with_row(stripes, row).tile(column, row);
         let pool = || workers.lock().unwrap_or_else(PoisonError::into_inner);
         let spare = pool().pop();
         let mut worker = spare.unwrap_or_else(Worker::new);
@@ -191,7 +199,7 @@ fn walk_tiles<S: Lanes>(
         tile.clear_part(gradient.width as usize - origin[0], gradient.height as usize - origin[1]);
         simd.vectorize(
             #[inline(always)]
-            || super::blend::blend(simd, tile, origin, list, splats, options.max_alpha, tape),
+            || super::blend::blend(simd, tile, origin, tile_entries, splats, options.max_alpha, tape),
         );
         *background = simd.vectorize(
             #[inline(always)]
@@ -211,15 +219,15 @@ impl Worker {
     }
 }
 
-/// Adds the tiles' shares to `sums`, in the order of the tiles. Each task has a range of splats to itself and looks
-/// through all tiles: how the ranges are cut changes no sum.
+/// Adds the tiles' shares to `sums`, in the order of the tiles. Each task owns a range of splats and scans all tiles,
+/// so the division into ranges changes no sum.
 fn add_shares(tiles: &[TileShare], sums: &mut [SplatSums]) {
     let len = sums.len().div_ceil(rayon::current_num_threads()).max(1);
     sums.par_chunks_mut(len).enumerate().for_each(|(i, sums)| {
         let first = (i * len) as u32;
         for tile in tiles {
             for (&splat, share) in tile.splats.iter().zip(&tile.sums) {
-                // Of a splat before the range it is huge.
+                // A splat before the range wraps around to a huge index.
                 let at = splat.wrapping_sub(first) as usize;
                 if let Some(sum) = sums.get_mut(at) {
                     for k in 0..10 {

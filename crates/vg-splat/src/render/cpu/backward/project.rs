@@ -1,5 +1,5 @@
-//! The projection backwards: from sums over pixels to the gradients of a Gaussian and of the camera; f64, eight
-//! Gaussians at a time, as `project` goes forward.
+//! Backward pass of the projection: from sums over pixels to the gradients of a Gaussian and of the camera, in f64,
+//! eight Gaussians at a time, as in the forward `project`.
 //!
 //! With J R R_q = [pa; pb] (2x3, its columns j_k), S = diag(s), A = J R R_q S and the blurred covariance
 //! `Sigma = A A^T + e I = L L^T`, the pixels give `dL/dSigma = 1/2 L^-T Y L^-1`, Y the sum of w times the outer square
@@ -43,23 +43,23 @@ pub(super) struct Chunk<'a> {
     pub(super) sh: &'a mut [f32],
 }
 
-/// What the forward pass decided about a splat, which the way back keeps to.
+/// Discrete decisions of the forward pass about a splat, which the backward pass keeps.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::render) struct Decided {
-    /// Whether its form has x as the pivot: see [`Splat`].
+    /// Whether x is the pivot of its exponent: see [`Splat`].
     pub(in crate::render) pivot_x: bool,
-    /// Whether each channel of its colour moves with its coefficients.
+    /// Whether each channel of its colour varies with its coefficients.
     pub(in crate::render) color_moves: [bool; 3],
 }
 
 impl Decided {
     #[inline(always)]
-    pub(super) fn of(splat: &Splat) -> Self {
+    pub(super) fn from_splat(splat: &Splat) -> Self {
         Self { pivot_x: splat.conditional < 0.0, color_moves: moves(splat.color) }
     }
 }
 
-/// Fills one chunk from the `sums` of its splats, which are `1 / unscale` times too small or too large.
+/// Fills one chunk from the `sums` of its splats, which must be multiplied by `unscale`.
 #[inline(always)]
 pub(super) fn project(
     view: &PinholeView,
@@ -76,7 +76,7 @@ pub(super) fn project(
     let mut camera = [0.0; 15];
     let mut next = 0;
     while next < n {
-        // The next eight that have a gradient; a last group that is not full repeats one.
+        // The next eight with a gradient; an incomplete last group repeats one.
         let mut index = [0; LANES];
         let mut count = 0;
         while next < n && count < LANES {
@@ -154,12 +154,12 @@ struct Outputs {
     opacity: [f64; LANES],
     /// dL/dR, then dL/dp.
     camera: [[f64; LANES]; 12],
-    /// From the camera to the Gaussian, unit.
+    /// Unit vector from the camera to the Gaussian.
     direction: [[f64; LANES]; 3],
     inverse_length: [f64; LANES],
 }
 
-/// One lane, without branches or closures, so that the compiler turns the loop over lanes into vectors.
+/// Differentiates one lane, without branches or closures, so that the compiler vectorises the loop over lanes.
 #[inline(always)]
 fn project_lane(
     view: &PinholeView,
@@ -209,7 +209,7 @@ fn project_lane(
         h_s[k] = p_k * inverse_s;
     }
 
-    // The sums are of base-2 whitened offsets: sigma = ln 2 q = half the square of sqrt(2 ln 2) (t, s).
+    // The sums use base-2 whitened offsets: sigma = ln 2 q = half the square of sqrt(2 ln 2) (t, s).
     const SQUARE: f64 = 2.0 * std::f64::consts::LN_2;
     let root = SQUARE.sqrt();
     let total = upstream[0][l];
@@ -238,7 +238,7 @@ fn project_lane(
         }
     }
 
-    // Antialiased: opacity * sqrt(det_0 / det), unless that is at its floor.
+    // Antialiased: opacity * sqrt(det_0 / det), unless it is at its floor.
     let floor = f64::from(MIN_COMPENSATION * MIN_COMPENSATION);
     let ratio = determinant_before / determinant;
     let compensated = view.antialiased & (ratio > floor);
@@ -263,7 +263,7 @@ fn project_lane(
     for k in 0..3 {
         out.scale[k][l] = s[k] * p[k][k];
     }
-    // 1/255 or more, as it was drawn.
+    // The opacity is at least 1/255, because the Gaussian was drawn.
     out.opacity[l] = total / f64::from(g.opacity[l]);
     let torque = [p[1][2] * (s2[1] - s2[2]), p[2][0] * (s2[2] - s2[0]), p[0][1] * (s2[0] - s2[1])];
     out.rotation[0][l] = -two * (qx * torque[0] + qy * torque[1] + qz * torque[2]);

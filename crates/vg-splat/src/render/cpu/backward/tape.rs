@@ -1,7 +1,7 @@
-//! What a tile has drawn, in order: front to back it is written by the blend, back to front it is read by the
-//! backward pass, which so has every transmittance as it was and never divides by 1 - alpha.
+//! Record of everything drawn in a tile: the blend writes it front to back, and the backward pass reads it back to
+//! front, so that it has the exact transmittances and never divides by 1 - alpha.
 //!
-//! It is bounded whatever the scene is. A pixel draws at most 2,344 layers: each leaves at most 254/255 of the
+//! Its size is bounded for any scene. A pixel draws at most 2,344 layers: each leaves at most 254/255 of the
 //! transmittance, which stops at 1e-4. A record holds eight pixels, of which at least one draws: at most 18,752 records
 //! per block and 156 MB per tile, and 20 MB where neighbouring pixels draw the same layers.
 
@@ -10,16 +10,16 @@ use super::super::simd::Lanes;
 use super::super::tile::{BLOCKS, TILE_HEIGHT};
 use pulp::f32x8;
 
-/// Blocks that are drawn between two calls of [`Record::rows`].
+/// Maximum number of blocks drawn between two calls of [`Record::rows`].
 const MOST_PER_CALL: usize = 64;
 
 /// Eight pixels of one splat.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub(super) struct Drawn {
-    /// 0 in lanes that drew nothing.
+    /// Alpha, 0 in lanes that drew nothing.
     pub(super) alpha: f32x8,
-    /// Transmittance before; of either sign where nothing was drawn.
+    /// Transmittance before drawing; of either sign where nothing was drawn.
     pub(super) transmittance: f32x8,
 }
 
@@ -28,20 +28,20 @@ pub(super) struct Drawn {
 pub(super) struct Layer {
     /// Index of the splat.
     pub(super) splat: u32,
-    /// Where its records end; they begin where the layer before ends.
+    /// End of its records; they begin at the end of the previous layer.
     pub(super) end: u32,
 }
 
 /// One tile's tape, reused from tile to tile.
 #[derive(Debug)]
 pub(super) struct Tape {
-    /// The first `len` are written; the rest is room.
+    /// Records, of which the first `len` are in use.
     drawn: Vec<Drawn>,
-    /// Block of the tile, beside `drawn`.
+    /// Block of the tile of each record.
     blocks: Vec<u8>,
     len: usize,
     layers: Vec<Layer>,
-    /// Sum of T alpha of each block: alpha to the last bit, which 1 - T is not where little is drawn (1.5e-5 of 1/255).
+    /// Sum of T alpha of each block. It is alpha without the cancellation of 1 - T, which loses 1.5e-5 of 1/255.
     covered: [f32x8; BLOCKS * TILE_HEIGHT],
 }
 
@@ -73,7 +73,7 @@ impl Tape {
         &self.layers
     }
 
-    /// Records of layer `i` and the blocks they lie on.
+    /// Records of layer `i`, and their blocks.
     #[inline(always)]
     pub(super) fn records(&self, i: usize) -> (&[Drawn], &[u8]) {
         let start = if i == 0 { 0 } else { self.layers[i - 1].end as usize };
@@ -98,7 +98,7 @@ impl Record for Tape {
     #[inline(always)]
     fn block<S: Lanes>(&mut self, simd: S, block: usize, alpha: f32x8, t: f32x8) {
         self.covered[block] = simd.mul_add(alpha, t, self.covered[block]);
-        // Written always and kept where a lane drew: no branch to mispredict.
+        // Always written, but kept only where a lane drew: no branch to mispredict.
         self.drawn[self.len] = Drawn { alpha, transmittance: t };
         self.blocks[self.len] = block as u8;
         let any = simd.sign_bits(simd.sub_f32s(simd.splat_f32s(0.0), alpha)) != 0;

@@ -1,27 +1,29 @@
-// Blending backwards: a tile is blended once more, then walked from its last layer to its first.
+// Backward blending: a tile is blended once more, then traversed from its last layer to its first.
 //
 // With (gc, ga, gd) the gradient of a pixel, every layer k contributes T_k alpha_k phi_k to the loss, where
-// phi_k = gc . colour + gd depth, and what lies behind the last one phi_end = gc . background - ga. S is what is seen
-// from a layer on, composited from the back:
-//   S_k = alpha_k phi_k + (1 - alpha_k) S_{k+1},   dL/dalpha_k = T_k (phi_k - S_{k+1})
-// The transmittance before a layer is what is left after it over 1 - alpha, which is 0.01 or more.
+// phi_k = gc . colour + gd depth, and the background phi_end = gc . background - ga. S is the composite from a layer
+// on, computed from the back:
 //
-// First a thread has a pixel, and writes w = alpha dL/dalpha and T alpha of each layer where all threads can read them.
-// Then it has a quarter of a layer's pixels, and adds up: one sum per pair, in the order of pixels, so that nothing
-// hangs on the order of threads and no two of them add to the same number.
+//   S_k = alpha_k phi_k + (1 - alpha_k) S_{k+1},   dL/dalpha_k = T_k (phi_k - S_{k+1})
+//
+// The transmittance before a layer is that after it divided by 1 - alpha, which is at least 0.0001.
+//
+// First each thread handles a pixel and writes w = alpha dL/dalpha and T alpha of each layer to workgroup memory. Then
+// it handles a quarter of a layer's pixels and adds them: one sum per pair, in the order of pixels, so that the result
+// does not depend on the order of threads and no two threads add to one number.
 
-// Of the band's pixels: red, green, blue, alpha, depth.
+// Gradient of the band's pixels: red, green, blue, alpha, depth.
 @group(0) @binding(6) var<storage, read> gradient: array<f32>;
 // [held_pairs][10]: w, w t, w s, w t t, w t s, w s s, red, green, blue, depth; (t, s) is the offset whitened, with
 // q = t^2 + s^2.
 @group(0) @binding(7) var<storage, read_write> shares: array<f32>;
-// [tiles of the window][4]: the gradient of the background's colour, and whether the driver left a loop before its end.
-// Not vectors: threads may not write to one vector's components at once.
+// [tiles of the window][4]: the gradient of the background's colour, and whether the driver ended a loop early. Not
+// vectors: threads must not write components of one vector concurrently.
 @group(0) @binding(8) var<storage, read_write> backgrounds: array<f32>;
 
-// Layers of one turn.
+// Layers per iteration.
 const LAYERS: u32 = 16u;
-// Words between two layers' pixels: four of them lie in different banks.
+// Words between two layers' pixels, so that four layers use different banks.
 const STRIDE: u32 = PIXELS + 4u;
 const SUMS: u32 = 10u;
 
@@ -41,7 +43,7 @@ fn pixel_center(group: vec2<u32>, lane: u32) -> vec2<f32> {
 }
 
 fn is_held(pair: u32) -> bool {
-    // Of a pair before the first the difference is huge.
+    // For a pair before the first, the difference wraps around to a huge number.
     return pair - frame.first_pair < frame.held_pairs;
 }
 
@@ -54,21 +56,21 @@ fn back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let tile = group.y * frame.tile_columns + group.x;
     let range = ranges[tile];
 
-    // Forward, as `blend`.
+    // Forward pass, as in `blend`.
     var t = select(-1.0, 1.0, is_inside);
     var covered = 0.0;
     var total_depth = 0.0;
-    // Past the last layer that was drawn.
+    // Slot after the last layer that was drawn.
     var end = range.x;
     for (var begin = range.x; begin < range.y; begin += PIXELS) {
-        if (!is_any(t > 0.0, lane)) {
+        if (!is_any_pixel_live(t > 0.0, lane)) {
             break;
         }
         let count = min(range.y - begin, PIXELS);
-        take(begin, count, lane);
+        load_batch(begin, count, lane);
         for (var k = 0u; k < count && t > 0.0; k++) {
             let s = batch[k];
-            let alpha = alpha_of(s, offset_of(s, center));
+            let alpha = splat_alpha(s, sheared_offset(s, center));
             if (alpha >= ALPHA_THRESHOLD) {
                 let next = t * (1.0 - alpha);
                 if (next > TRANSMITTANCE_THRESHOLD) {
@@ -123,9 +125,9 @@ fn back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         shared_number = atomicLoad(&last_layer);
     }
     let last = workgroupUniformLoad(&shared_number);
-    // Layers that nobody sees.
-    for (var i = last + lane; i < range.y; i += PIXELS) {
-        let pair = pairs[i];
+    // Layers that no pixel sees.
+    for (var slot = last + lane; slot < range.y; slot += PIXELS) {
+        let pair = pair_from_slot[slot];
         if (is_held(pair)) {
             for (var j = 0u; j < SUMS; j++) {
                 shares[(pair - frame.first_pair) * SUMS + j] = 0.0;
@@ -138,16 +140,16 @@ fn back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         let begin = stop - count;
         stop = begin;
         if (lane < count) {
-            batch_pairs[lane] = pairs[begin + lane];
+            batch_pairs[lane] = pair_from_slot[begin + lane];
         }
-        take(begin, count, lane);
+        load_batch(begin, count, lane);
         for (var k = count; k > 0u;) {
             k--;
             var w = 0.0;
             var weight = 0.0;
             if (begin + k < end) {
                 let s = batch[k];
-                let alpha = alpha_of(s, offset_of(s, center));
+                let alpha = splat_alpha(s, sheared_offset(s, center));
                 if (alpha >= ALPHA_THRESHOLD) {
                     let tint = batch_tints[k];
                     let phi = dot(toward.xyz, tint.xyz) + toward.w * tint.w;
@@ -167,7 +169,7 @@ fn back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         let quarter = lane % 4u;
         if (layer < count) {
             let s = batch[layer];
-            // Of a splat that is far off, and huge, shape and place get no gradient.
+            // The shape and place of a huge, far-off splat get no gradient.
             let is_near = max(abs(s.rest_x), abs(s.rest_y)) < MAX_PIXELS;
             let whiten = select(vec2(0.0), vec2(sqrt(abs(s.conditional)), sqrt(s.marginal)), is_near);
             var sum: array<f32, SUMS>;
@@ -177,7 +179,7 @@ fn back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             for (var p = quarter; p < PIXELS; p += 4u) {
                 let pixel = weights[layer * STRIDE + p];
                 if (pixel.y > 0.0) {
-                    let offset = whiten * offset_of(s, pixel_center(group.xy, p));
+                    let offset = whiten * sheared_offset(s, pixel_center(group.xy, p));
                     let w = pixel.x;
                     let wt = w * offset.x;
                     let ws = w * offset.y;
@@ -211,7 +213,7 @@ fn back(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         }
         workgroupBarrier();
     }
-    if (is_cut_short(frame.nothing)) {
+    if (is_cut_short(frame.opaque_zero)) {
         backgrounds[4u * tile + 3u] = 1.0;
     }
 }

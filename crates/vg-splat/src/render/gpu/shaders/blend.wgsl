@@ -1,23 +1,23 @@
-// Front-to-back blending of one tile, a pixel a thread.
+// Front-to-back blending of one tile, one pixel per thread.
 
 // The band's planes: colour [pixels][3], alpha [pixels], depth [pixels]. Between slices the plane of alpha holds the
-// transmittance, negative where the pixel is finished. A picture of bytes takes the plane of depth, and leaves the rest.
-// As bits: not every pattern of bytes is a float that survives.
+// transmittance, negative where the pixel is finished. A picture of bytes uses the plane of depth only. The type is u32
+// because not every bit pattern is preserved as a float.
 @group(0) @binding(6) var<storage, read_write> picture: array<u32>;
-// 1: a pixel is not finished; 2: the driver left a loop before its end.
+// 1: a pixel is unfinished; 2: the driver ended a loop early.
 @group(0) @binding(7) var<storage, read_write> unfinished: array<atomic<u32>>;
 
-// `is_last` of a picture of bytes.
+// `is_last` for a picture of bytes.
 const BYTES: u32 = 2u;
 
-// Rounded, halves up; cut at 255.
+// Rounds halves up and clamps at 255.
 fn to_byte(v: f32) -> u32 {
     let x = min(v * 255.0, 255.0);
     let whole = floor(x);
     return u32(whole) + select(0u, 1u, x - whole >= 0.5);
 }
 
-// Red in the lowest byte. On no background colour is divided by alpha, on one alpha is 255.
+// Red is the lowest byte. On a transparent background colour is divided by alpha; otherwise alpha is 255.
 fn rgba8(color: vec3<f32>, alpha: f32) -> u32 {
     let is_opaque = frame.background.w != 0.0;
     let straight = select(0.0, 1.0 / max(alpha, 1e-30), alpha > 0.0);
@@ -35,7 +35,7 @@ fn blend(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     let pixels = frame.width * min(frame.tile_rows * TILE, frame.height - frame.first_tile_row * TILE);
     let pixel = row * frame.width + x;
 
-    // Negative: finished.
+    // Transmittance, negative where the pixel is finished.
     var t = select(-1.0, 1.0, is_inside);
     var color = vec3(0.0);
     var depth = 0.0;
@@ -49,18 +49,18 @@ fn blend(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
 
     let range = ranges[group.y * frame.tile_columns + group.x];
     for (var begin = range.x; begin < range.y; begin += PIXELS) {
-        if (!is_any(t > 0.0, lane)) {
+        if (!is_any_pixel_live(t > 0.0, lane)) {
             break;
         }
         let count = min(range.y - begin, PIXELS);
-        take(begin, count, lane);
+        load_batch(begin, count, lane);
         for (var k = 0u; k < count && t > 0.0; k++) {
             let s = batch[k];
-            let alpha = alpha_of(s, offset_of(s, center));
+            let alpha = splat_alpha(s, sheared_offset(s, center));
             if (alpha >= ALPHA_THRESHOLD) {
                 let next = t * (1.0 - alpha);
                 if (next > TRANSMITTANCE_THRESHOLD) {
-                    // What t lost: that sums up to the 1 - t by which depth is divided.
+                    // The decrease of t, which sums exactly to the 1 - t by which depth is divided.
                     let weight = t - next;
                     color += weight * batch_tints[k].xyz;
                     depth += weight * batch_tints[k].w;
@@ -74,7 +74,7 @@ fn blend(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     if (!is_inside) {
         return;
     }
-    if (is_cut_short(frame.nothing)) {
+    if (is_cut_short(frame.opaque_zero)) {
         atomicOr(&unfinished[0], 2u);
     }
     if (frame.is_last != 0u) {

@@ -1,11 +1,11 @@
-// Gaussians to splats: EWA projection and colour, one Gaussian a thread.
+// EWA projection and colour of Gaussians, one Gaussian per thread.
 //
 // With J R R_q S = [a; b] the blurred covariance is [[a.a + e, a.b], [a.b, b.b + e]] and its determinant, by
 // Cauchy-Binet, e^2 + e (a.a + b.b) + |a x b|^2: a sum of squares, exact to rounding for needles. Depth and centre are
-// found with twice f32's digits; shape is scaled by a power of two, so that no square leaves f32.
+// computed with twice f32's digits; shape is scaled by a power of two, so that no square leaves f32.
 
 struct Chunk {
-    // Of the Gaussians in these buffers.
+    // Range of the Gaussians in these buffers.
     first: u32,
     count: u32,
 }
@@ -23,28 +23,29 @@ struct Chunk {
 
 const MAX_COORDINATE: f32 = 1e20;
 
-// Compilers simplify (a + b) - a, which is not b in floating point. They cannot see through this.
+// Returns x, opaquely to the compiler, which may otherwise simplify (a + b) - a to b although they differ in floating
+// point.
 fn opaque(x: f32) -> f32 {
-    return bitcast<f32>(bitcast<u32>(x) ^ frame.nothing);
+    return bitcast<f32>(bitcast<u32>(x) ^ frame.opaque_zero);
 }
 
-// A number of twice the digits is x + y with |y| at most half of x's last digit.
+// a + b with twice the digits: x + y with |y| at most half of x's last digit.
 fn two_sum(a: f32, b: f32) -> vec2<f32> {
     let sum = opaque(a + b);
-    let of_b = opaque(sum - a);
-    return vec2(sum, (a - (sum - of_b)) + (b - of_b));
+    let rounded_b = opaque(sum - a);
+    return vec2(sum, (a - (sum - rounded_b)) + (b - rounded_b));
 }
 
-// As `two_sum` where |a| >= |b|.
+// `two_sum` for |a| >= |b|.
 fn ordered_sum(a: f32, b: f32) -> vec2<f32> {
     let sum = opaque(a + b);
     return vec2(sum, b - (sum - a));
 }
 
 fn two_product(a: f32, b: f32) -> vec2<f32> {
-    // Rounded: a multiplication fused with the subtraction below would not be.
+    // Opaque, so that it is rounded and not fused with the subtraction below.
     let product = opaque(a * b);
-    // Halves of twelve digits: all their products are exact.
+    // Halves of twelve bits, whose products are exact.
     let a1 = bitcast<f32>(bitcast<u32>(a) & 0xfffff000u);
     let b1 = bitcast<f32>(bitcast<u32>(b) & 0xfffff000u);
     let a2 = a - a1;
@@ -102,7 +103,7 @@ fn project(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     var x = divide(along(0u, d), z);
     var y = divide(along(1u, d), z);
-    // Beyond this a centre is nowhere near a picture, and products would leave f32.
+    // Beyond this a centre is far outside any picture, and products would leave f32.
     if (abs(x.x) > 1e18) {
         x = vec2(clamp(x.x, -1e18, 1e18), 0.0);
     }
@@ -130,7 +131,7 @@ fn project(@builtin(global_invocation_id) id: vec3<u32>) {
     var a = vec3(dot(jx, column_x), dot(jx, column_y), dot(jx, column_z)) * scale;
     var b = vec3(dot(jy, column_x), dot(jy, column_y), dot(jy, column_z)) * scale;
 
-    // In units of a power of two near the largest of them.
+    // Scaled by a power of two near the largest of them.
     let largest_a = max(abs(a.x), max(abs(a.y), abs(a.z)));
     let largest_b = max(abs(b.x), max(abs(b.y), abs(b.z)));
     let largest = max(largest_a, largest_b);
@@ -156,7 +157,7 @@ fn project(@builtin(global_invocation_id) id: vec3<u32>) {
     let variance_y = bb + e;
     let pivot_x = variance_x > variance_y;
     let pivot = select(variance_y, variance_x, pivot_x);
-    // det >= e pivot: no narrower than the blur, whatever rounding or underflow says.
+    // det >= e pivot: the splat is no narrower than the blur, despite rounding and underflow.
     let conditional = HALF_LOG2_E * min(pivot / determinant * per_unit * per_unit, 1.0 / frame.blur);
     let marginal = HALF_LOG2_E / pivot * per_unit * per_unit;
 
@@ -176,7 +177,7 @@ fn project(@builtin(global_invocation_id) id: vec3<u32>) {
     let whole_v = clamp(round(v.x), -32000.0, 32000.0);
     let rest_u = clamp((u.x - whole_u) + u.y, -MAX_PIXELS, MAX_PIXELS);
     let rest_v = clamp((v.x - whole_v) + v.y, -MAX_PIXELS, MAX_PIXELS);
-    // Distance from the picture, with what rounding may have taken.
+    // Distance from the picture, with slack for rounding.
     let beyond_u = max(-whole_u - rest_u, whole_u - f32(frame.width) + rest_u);
     let beyond_v = max(-whole_v - rest_v, whole_v - f32(frame.height) + rest_v);
     let slack_u = 0.01 + 1e-6 * (abs(rest_u) + reach_x);
@@ -208,7 +209,7 @@ fn coefficient(first: u32, k: u32) -> vec3<f32> {
 // max(0, 0.5 + sum_k sh_k Y_k(d)), in 3DGS's order and signs.
 fn color(i: u32, d: vec3<f32>) -> vec3<f32> {
     let first = i * frame.sh_stride;
-    // The largest component first: its square may leave f32.
+    // Divide by the largest component first: its square may leave f32.
     let largest = max(max(abs(d.x), abs(d.y)), max(abs(d.z), 1e-30));
     let scaled = d / largest;
     let n = scaled / length(scaled);

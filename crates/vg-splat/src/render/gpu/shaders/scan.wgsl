@@ -1,8 +1,8 @@
-// Running sums of any length: each block of 2048 by itself, its total for the level above, and down again.
-// Sums that leave u32 stay at its largest number.
+// Prefix sums of any length: each block of 2048 by itself, its total to the level above, and down again. Sums saturate
+// at the largest u32.
 
 @group(0) @binding(0) var<storage, read_write> values: array<u32>;
-// One per block: its total on the way up, what lies before it on the way down.
+// One per block: its total on the way up, the sum before it on the way down.
 @group(0) @binding(1) var<storage, read_write> totals: array<u32>;
 
 const THREADS: u32 = 256u;

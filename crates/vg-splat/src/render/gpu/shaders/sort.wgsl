@@ -1,21 +1,21 @@
-// One pass of a stable radix sort by four bits: count digits per block of 1024, sum over (digit, block), scatter.
-// No floating point and no order of threads decides where an entry goes.
+// One pass of a stable radix sort by four bits: count digits per block of 1024, sum over (digit, block), scatter. An
+// entry's place depends neither on floating point nor on the order of threads.
 
 struct Pass {
-    // Of the digit in the key.
+    // Position of the digit in the key, bits.
     shift: u32,
-    // The first pass: values are the entries' own numbers, and keys of NOT_DRAWN are left out.
+    // In the first pass values are the entries' own indices, and entries with the key NOT_DRAWN are dropped.
     is_first: u32,
-    // Blocks that are launched.
+    // Number of blocks launched.
     blocks: u32,
     padding: u32,
 }
 
 @group(0) @binding(0) var<uniform> sort: Pass;
-// How many entries there are.
+// Number of entries.
 @group(0) @binding(1) var<storage, read> counter: array<u32>;
 @group(0) @binding(2) var<storage, read> keys: array<u32>;
-// [16][blocks]: counts, then where each begins.
+// [16][blocks]: counts, then starts.
 @group(0) @binding(3) var<storage, read_write> histogram: array<u32>;
 @group(0) @binding(4) var<storage, read> values: array<u32>;
 @group(0) @binding(5) var<storage, read_write> keys_out: array<u32>;
@@ -28,7 +28,7 @@ const BLOCK: u32 = 1024u;
 var<workgroup> counts: array<atomic<u32>, 16>;
 
 fn is_entry(i: u32) -> bool {
-    // The key is looked at only where there is one.
+    // The key is read only where there is one.
     if (i >= min(counter[0], arrayLength(&keys))) {
         return false;
     }
@@ -54,10 +54,10 @@ fn count(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     }
 }
 
-// Word w of thread t, at w * THREADS + t: entries of digit w in the low half, of digit w + 8 in the high half.
+// Word w of thread t, at w * THREADS + t: counts of digit w in the low half, of digit w + 8 in the high half.
 var<workgroup> ranks: array<u32, 2048>;
 var<workgroup> partial: array<u32, THREADS>;
-// Where the block's entries of a digit go.
+// Destination of the block's entries of each digit.
 var<workgroup> starts: array<u32, 16>;
 
 @compute @workgroup_size(THREADS)
@@ -65,7 +65,7 @@ fn scatter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
     for (var w = 0u; w < 8u; w++) {
         ranks[w * THREADS + lane] = 0u;
     }
-    // Each thread has four entries that follow each other, and counts them by digit.
+    // Each thread counts its four consecutive entries by digit.
     var key: array<u32, EACH>;
     var rank: array<u32, EACH>;
     let first = group.x * BLOCK + lane * EACH;
@@ -106,7 +106,7 @@ fn scatter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
     if (lane > 0u) {
         before = partial[lane - 1u];
     }
-    // What is in the low halves comes before what is in the high ones.
+    // The digits of the low halves precede those of the high halves.
     before += (partial[THREADS - 1u] & 0xffffu) << 16u;
     for (var k = 0u; k < 8u; k++) {
         ranks[lane * 8u + k] += before;

@@ -1,17 +1,17 @@
-// Which tiles a splat touches: the exact ellipse where alpha reaches 1/255, a row of tiles at a time.
+// Tiles that a splat touches: by the exact ellipse where alpha reaches 1/255, a row of tiles at a time.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-// How many splats are drawn.
+// Number of splats drawn.
 @group(0) @binding(1) var<storage, read> counter: array<u32>;
-// Splats in order of depth.
-@group(0) @binding(2) var<storage, read> order: array<u32>;
+// Splat at each depth rank.
+@group(0) @binding(2) var<storage, read> splat_from_rank: array<u32>;
 @group(0) @binding(3) var<storage, read> splats: array<Splat>;
-// By rank in depth: how many pairs a splat has, then where they begin.
+// By depth rank: the number of the splat's pairs, then the first of them.
 @group(0) @binding(4) var<storage, read_write> offsets: array<u32>;
-// Tile of each pair, in order of depth.
-@group(0) @binding(5) var<storage, read_write> pair_tiles: array<u32>;
-@group(0) @binding(6) var<storage, read_write> pair_splats: array<u32>;
-// The rank that comes after the slice, or none.
+// Tile and splat of each pair, in depth order.
+@group(0) @binding(5) var<storage, read_write> tile_from_pair: array<u32>;
+@group(0) @binding(6) var<storage, read_write> splat_from_pair: array<u32>;
+// Depth rank at which the slice ends, or u32's largest number.
 @group(0) @binding(7) var<storage, read_write> slice_end: array<u32>;
 
 struct Ellipse {
@@ -50,8 +50,9 @@ fn ellipse(s: Splat) -> Ellipse {
     return e;
 }
 
-// First and last of the pixels 0..count whose centres lie in [low, high], as tiles, first > last where there is none.
-// Rounding of what led here, generously: what it lets in is cut at alpha < 1/255.
+// First and last tile of the pixels 0..count whose centres lie in [low, high]; first > last where there is none. The
+// slack is a generous bound of the rounding so far; excess tiles are rejected by alpha < 1/255. Rounding of what led
+// here, generously: what it lets in is cut at alpha < 1/255.
 fn tiles_between(low: f32, high: f32, count: u32) -> vec2<i32> {
     let slack = 0.01 + 2e-6 * max(abs(low), abs(high));
     let last = f32(count) - 1.0;
@@ -63,14 +64,14 @@ fn tiles_between(low: f32, high: f32, count: u32) -> vec2<i32> {
     return vec2<i32>(vec2(first_pixel, last_pixel)) / i32(TILE);
 }
 
-// Rows of tiles in the band.
+// Rows of tiles that the ellipse touches, within the band.
 fn rows(e: Ellipse) -> vec2<i32> {
     let rows = tiles_between(e.center.y - e.reach_y, e.center.y + e.reach_y, frame.height);
     let first = i32(frame.first_tile_row);
     return vec2(max(rows.x, first), min(rows.y, first + i32(frame.tile_rows) - 1));
 }
 
-// Columns of tiles in one row of them, of those in the window.
+// Columns of tiles that the ellipse touches in one row of tiles, within the window.
 fn columns(e: Ellipse, row: i32) -> vec2<i32> {
     let top = f32(row * i32(TILE)) + 0.5 - e.center.y;
     let low = clamp(top, -e.reach_y, e.reach_y);
@@ -89,13 +90,13 @@ fn columns(e: Ellipse, row: i32) -> vec2<i32> {
 @compute @workgroup_size(256)
 fn cover(@builtin(global_invocation_id) id: vec3<u32>) {
     let rank = id.x;
-    // At least one more than there are splats: the running sum puts the total there.
+    // At least one more than there are splats: the prefix sum stores the total there.
     if (rank >= arrayLength(&offsets)) {
         return;
     }
     var pairs = 0u;
     if (rank >= frame.slice_start && rank < counter[0] && rank - frame.slice_start < frame.slice_splats) {
-        let e = ellipse(splats[order[rank]]);
+        let e = ellipse(splats[splat_from_rank[rank]]);
         let r = rows(e);
         for (var row = r.x; row <= r.y; row++) {
             let c = columns(e, row);
@@ -105,7 +106,7 @@ fn cover(@builtin(global_invocation_id) id: vec3<u32>) {
     offsets[rank] = pairs;
 }
 
-// Pairs of one splat that a thread writes: drivers that run on the CPU end loops after 65,535 turns.
+// Pairs of one splat that one thread writes: drivers that run on the CPU end loops after 65,535 iterations.
 const PART: u32 = 32768u;
 
 @compute @workgroup_size(256)
@@ -126,29 +127,29 @@ fn emit(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let stop = min(min(begin + PART, end), frame.pair_capacity);
-    var at = begin;
+    var pair = begin;
     if (end <= frame.pair_capacity) {
-        let splat = order[rank];
+        let splat = splat_from_rank[rank];
         let e = ellipse(splats[splat]);
         let r = rows(e);
-        // Those of the parts before.
+        // Skip the pairs of the previous parts.
         var skip = i32(id.y * PART);
-        for (var row = r.x; row <= r.y && at < stop; row++) {
+        for (var row = r.x; row <= r.y && pair < stop; row++) {
             let c = columns(e, row);
             let count = max(c.y - c.x + 1, 0);
             let first = (row - i32(frame.first_tile_row)) * i32(frame.tile_columns) - i32(frame.first_tile_column);
-            for (var column = c.x + min(skip, count); column <= c.y && at < stop; column++) {
-                pair_tiles[at] = u32(first + column);
-                pair_splats[at] = splat;
-                at++;
+            for (var column = c.x + min(skip, count); column <= c.y && pair < stop; column++) {
+                tile_from_pair[pair] = u32(first + column);
+                splat_from_pair[pair] = splat;
+                pair++;
             }
             skip = max(skip - count, 0);
         }
     } else {
         slice_end[0] = rank;
     }
-    // Nothing is left undefined: not where the slice ends, and not if two kernels should round differently.
-    for (; at < stop; at++) {
-        pair_tiles[at] = NOT_DRAWN;
+    // Leave no pair undefined, neither at the end of the slice nor if the two kernels round differently.
+    for (; pair < stop; pair++) {
+        tile_from_pair[pair] = NOT_DRAWN;
     }
 }
