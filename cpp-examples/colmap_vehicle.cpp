@@ -1,10 +1,10 @@
-// A COLMAP folder to a model of the vehicle.
+// Makes a model of the vehicle from a COLMAP folder.
 //
 //     colmap_vehicle FOLDER VEHICLE_FROM_WORLD.json CAR.ply [IMAGE...]
 //
-// FOLDER has COLMAP's model in sparse/0, photographs in images/ and masks in masks/. COLMAP's world lies
-// anywhere and has any scale, so it also takes the similarity to the vehicle's frame, a 4x4 matrix in a JSON
-// file; `vg align` finds one. IMAGE...: the photographs to use; all if none are named.
+// FOLDER has COLMAP's model in sparse/0, photographs in images/ and masks in masks/. COLMAP's world has an
+// arbitrary pose and scale, so the similarity to the vehicle's frame is needed too, a 4x4 matrix in a JSON
+// file; `vg align` finds it. IMAGE...: the photographs to use; default: all.
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -13,7 +13,7 @@
 
 #include <vg.hpp>
 
-// A value, or the end of the program.
+// Returns the value, or ends the program with the error.
 template <class T> T must(vg::Result<T> result) {
     if (!result) {
         std::fprintf(stderr, "colmap_vehicle: %s\n", result.error().message.c_str());
@@ -22,7 +22,7 @@ template <class T> T must(vg::Result<T> result) {
     return result.take();
 }
 
-// The 16 numbers of {"vehicle_from_world": [[...], [...], [...], [...]]}; the rest is not looked at.
+// Reads the 16 numbers of {"vehicle_from_world": [[...], [...], [...], [...]]} and ignores the rest.
 static vg::Similarity read_similarity(const std::string &path) {
     std::ifstream file(path);
     const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
@@ -78,6 +78,6 @@ int main(int argc, char **argv) {
         figures.extent_high[2] - figures.extent_low[2], figures.total_ms);
     std::printf("on the photographs themselves: %.1f dB, silhouettes overlap by %.3f\n",
                 figures.input_psnr_db, figures.input_silhouette_iou);
-    // made.report.json() tells the rest: times by stage, what was left out and why.
+    // made.report.json() has more: times by stage, what was left out and why.
     return 0;
 }

@@ -1,6 +1,6 @@
 /*
- * The shortest program that does it all: reads the first views of a scene, makes the vehicle, draws it as the
- * view after them, and writes a PPM. Only the C library and libvg.
+ * The shortest complete program: reads the first views of a scene, makes the model, renders it from the next
+ * view, and writes a PPM. It needs only the C library and libvg.
  *
  *     embed_min SCENE COUNT OUT.ppm        e.g.: embed_min tests/data/sedan 4 unseen.ppm
  */
@@ -9,7 +9,7 @@
 
 #include "vg.h"
 
-/* Every call that can fail returns a status and says why in an error, which is the caller's to free. */
+/* Every call that can fail returns a status, and an error with a message that the caller frees. */
 static void must(vg_status status, vg_error *error) {
     if (status != VG_STATUS_OK) {
         fprintf(stderr, "embed_min: %s\n", vg_error_message(error));
@@ -34,8 +34,8 @@ int main(int argc, char **argv) {
         return 2;
     }
 
-    /* A view: photograph, mask, depth where there is one, lens and pose. Here it points into the scene; it
-     * could as well point to a camera driver's memory. */
+    /* A view: photograph, mask, depth if there is one, lens and pose. Here it points into the scene; it
+     * could also point to a camera driver's memory. */
     vg_view *views = calloc(count + 1, sizeof *views);
     for (size_t i = 0; i <= count; i++) {
         vg_view_init(&views[i], sizeof views[i]);

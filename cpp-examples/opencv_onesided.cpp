@@ -1,4 +1,4 @@
-// Photographs of the right side of a vehicle in, pictures of its left side out, with OpenCV.
+// Renders the left side of a vehicle from photographs of its right side, with OpenCV.
 //
 //     opencv_onesided FOLDER OUT_FOLDER [--no-depth] [--show]
 //
@@ -19,9 +19,9 @@ struct Frame {
     vg_camera camera;
 };
 
-// The cameras, read here to show where each number goes. With a calibration of OpenCV's take
-// vg::camera_from_opencv, which knows that OpenCV puts the centre of the first pixel elsewhere; with a
-// tracker's boxes take vg::pose_from_box.
+// Reads the cameras, to show where each number goes. For a calibration by OpenCV use
+// vg::camera_from_opencv, which handles OpenCV's different centre of the first pixel; for tracked boxes use
+// vg::pose_from_box.
 static std::vector<Frame> read_frames(const std::string &folder) {
     std::vector<Frame> frames;
     const cv::FileStorage json(folder + "/transforms.json", cv::FileStorage::READ);
@@ -78,7 +78,7 @@ static int run(int argc, char **argv) {
         }
     }
 
-    // One set of threads for all calls.
+    // All calls share one set of threads.
     const vg::Context context = vg::Context::make().take();
     vg::Options options;
     options.context = context.get();

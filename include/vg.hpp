@@ -27,7 +27,7 @@
  *         return saved ? 0 : failed(saved.error());
  *     }
  *
- * The same with exceptions:
+ * With exceptions:
  *
  *     #define VG_HPP_EXCEPTIONS
  *     #include <vg.hpp>
@@ -44,32 +44,30 @@
  *         }
  *     }
  *
- * The chapter CONVENTIONS of vg.h holds for all of this: frames, poses, pixels, images, threads. What this
- * file adds:
+ * The chapter CONVENTIONS of vg.h applies here too: frames, poses, pixels, images, threads. This file adds:
  *
- * Results.   Functions that can fail return a Result, which holds either the value or an Error and may not be
- *            ignored. Check it before the value is used, or say by value_or what to take instead. take(), value(),
- *            * and -> of a Result that holds an Error print its message and end the program; with
- *            VG_HPP_EXCEPTIONS, defined before this file, they throw a vg::Exception. Files of one program may
- *            differ in that. Nothing else here throws or needs exceptions or run-time type information;
- *            std::vector and std::string may throw std::bad_alloc where exceptions are on.
+ * Results.   Functions that can fail return a Result, which holds either the value or an Error and must not be
+ *            ignored. Check it before the value is used, or give a default by value_or. take(), value(), * and ->
+ *            of a Result that holds an Error print its message and end the program; if VG_HPP_EXCEPTIONS is
+ *            defined before this file, they throw a vg::Exception. Files of one program may differ in that.
+ *            Nothing else here throws or needs exceptions or run-time type information; std::vector and
+ *            std::string may throw std::bad_alloc where exceptions are on.
  *
- * Ownership. Context, Model, Scene, Gaussians and Report own one handle and are moved, not copied. One that was
- *            moved away is empty: no views, no Gaussians, and an error where it is used. A vg_view, a
- *            vg_image and a Span own nothing: they point into a Scene, a cv::Mat or Gaussians, which must
- *            outlive them.
+ * Ownership. Context, Model, Scene, Gaussians and Report own one handle and are moved, not copied. A moved-from
+ *            object is empty: it has no views or Gaussians, and using it is an error. A vg_view, a vg_image and a
+ *            Span own nothing: they point into a Scene, a cv::Mat or Gaussians, which must outlive them.
  *
  * Options.   Options, ModelOptions, SegmentOptions, RenderOptions, RefineOptions, SceneOptions are the structs of
- *            vg.h with their default values set. Their fields are explained there. Those that hold a choice take
- *            the enum class of that choice, `options.prior = vg::Prior::Hull`, or vg.h's own name for it,
- *            VG_PRIOR_HULL, and nothing else: the name of another choice does not compile.
+ *            vg.h with their default values set. Their fields are explained there. A field of an enumeration takes
+ *            its enum class, `options.prior = vg::Prior::Hull`, or the enumerator of vg.h, VG_PRIOR_HULL; an
+ *            enumerator of another enumeration does not compile.
  *
- * Callbacks. on_progress and on_log take any callable. They come on the calling thread, one at a time. An
+ * Callbacks. on_progress and on_log take any callable. They are called on the calling thread, one at a time. An
  *            exception that leaves one ends the program (std::terminate), because it cannot pass through the
  *            library.
  *
  * OpenCV     is used where <opencv2/core.hpp> is found, Eigen where <Eigen/Core> is. VG_NO_OPENCV and
- *            VG_NO_EIGEN, defined before this file, keep them out. They only add functions.
+ *            VG_NO_EIGEN, defined before this file, disable them. They only add functions.
  */
 #ifndef VG_HPP
 #define VG_HPP
@@ -106,7 +104,7 @@
 
 namespace vg {
 
-// What ends the program in one file and throws in another is not the same function, nor of the same type.
+// Functions that end the program in one file and throw in another must have different types.
 #ifdef VG_HPP_EXCEPTIONS
 inline namespace throwing {
 #endif
@@ -127,7 +125,7 @@ inline const char *status_name(vg_status status) noexcept {
 
 #ifdef VG_HPP_EXCEPTIONS
 
-/// What take() of a failed call throws.
+/// Exception that take() of a failed call throws.
 class Exception : public std::runtime_error {
   public:
     explicit Exception(const Error &error) : std::runtime_error(error.message), status_(error.status) {}
@@ -142,7 +140,7 @@ class Exception : public std::runtime_error {
 
 namespace detail {
 
-/// A Result was not what its caller took it for.
+/// Ends the program after a wrong use of a Result.
 [[noreturn]] inline void misused(const char *what, const char *message) noexcept {
     std::fprintf(stderr, "vg::Result: %s %s\n", what, message);
     std::abort();
@@ -168,8 +166,8 @@ inline constexpr bool aborts = true;
 
 } // namespace detail
 
-/// A value, or why there is none. Asking for a value that is not there ends the program, or throws where
-/// VG_HPP_EXCEPTIONS is defined; asking for an error that is not there ends the program.
+/// A value or an error. Access to the value of a failed call ends the program, or throws if VG_HPP_EXCEPTIONS is
+/// defined; access to the error of a successful call ends the program.
 template <class T> class [[nodiscard]] Result {
   public:
     Result(T value) : held_(std::in_place_index<0>, std::move(value)) {}
@@ -186,7 +184,7 @@ template <class T> class [[nodiscard]] Result {
     T *operator->() noexcept(detail::aborts) { return checked(this); }
     const T *operator->() const noexcept(detail::aborts) { return checked(this); }
 
-    /// The value, or this one where the call failed.
+    /// The value, or the argument if the call failed.
     T value_or(T otherwise) const & { return ok() ? value() : std::move(otherwise); }
     T value_or(T otherwise) && { return ok() ? std::move(*checked(this)) : std::move(otherwise); }
 
@@ -223,7 +221,7 @@ template <> class [[nodiscard]] Result<void> {
     bool ok() const noexcept { return ok_; }
     explicit operator bool() const noexcept { return ok_; }
 
-    /// Nothing, so that what takes any Result also takes this one.
+    /// Does nothing; exists so that generic code can handle any Result.
     void take() const noexcept(detail::aborts) {
         if (!ok_) {
             detail::no_value(error_);
@@ -253,14 +251,14 @@ template <class T, std::size_t N> T *numbers(std::vector<std::array<T, N>> &elem
     return const_cast<T *>(numbers(std::as_const(elements)));
 }
 
-/// The C error as ours; frees it.
+/// Converts the C error to an Error and frees it.
 inline Error caught(vg_status status, vg_error *error) {
     Error ours{status, vg_error_message(error)};
     vg_error_free(error);
     return ours;
 }
 
-/// Calls a function that has nothing to give but its status.
+/// Calls a function that only returns a status.
 template <class Call> Result<void> done(Call call) {
     vg_error *error = nullptr;
     const vg_status status = call(&error);
@@ -302,14 +300,14 @@ struct Free {
 
 } // namespace detail
 
-// ---- Small things
+// ---- Small types
 
 /// Version of the library that is running, "0.1.0".
 inline const char *version() noexcept {
     return vg_version();
 }
 
-/// Elements that somebody else owns. Converts to std::span where there is one.
+/// A view of elements that it does not own. Converts to std::span where there is one.
 template <class T> class Span {
   public:
     constexpr Span() noexcept = default;
@@ -333,20 +331,20 @@ using Pose = std::array<double, 12>;
 /// A 4x4 similarity, ROW-MAJOR, as `vehicle_from_world`.
 using Similarity = std::array<double, 16>;
 
-/// The pose of a camera that stands in the vehicle's origin and looks along its z axis.
+/// The pose of a camera at the vehicle's origin that looks along the vehicle's z axis.
 constexpr Pose identity_pose{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
-/// What a progress callback wants.
+/// Return value of a progress callback.
 enum class Flow {
     Continue,
     /// Ends the call with VG_STATUS_CANCELLED.
     Cancel,
 };
 
-/// Told the stage, and how much of it is done, 0 to 1.
+/// Receives the stage and the fraction of it that is done, 0 to 1.
 using ProgressCallback = std::function<Flow(const char *stage, double fraction)>;
 
-/// Told one line.
+/// Receives one line.
 using LogCallback = std::function<void(vg_log_level level, const char *message)>;
 
 namespace detail {
@@ -361,7 +359,7 @@ inline void log(std::int32_t level, const char *message, void *user) noexcept {
     callback(static_cast<vg_log_level>(level), message);
 }
 
-/// A callback as the pointer that comes back to the functions above, which do not change it.
+/// The callback as the user pointer that the functions above receive; they do not change it.
 template <class Callback> void *user_pointer(const Callback &callback) noexcept {
     return const_cast<Callback *>(&callback);
 }
@@ -393,13 +391,13 @@ enum class Calibrate : std::int32_t {
     Off = VG_CALIBRATE_OFF,
 };
 
-/// Whether mirror images are shown in the light of their own side: vg_relight.
+/// Whether mirror images are relit for their own side: vg_relight.
 enum class Relight : std::int32_t {
     Auto = VG_RELIGHT_AUTO,
     Never = VG_RELIGHT_NEVER,
 };
 
-/// What may not be left out, as a set: `vg::Keep::Overlap | vg::Keep::Floaters`. vg_keep.
+/// Omissions that must not be made, as a set: `vg::Keep::Overlap | vg::Keep::Floaters`. vg_keep.
 enum class Keep : std::uint32_t {
     Nothing = 0,
     DuplicateViews = VG_KEEP_DUPLICATE_VIEWS,
@@ -413,45 +411,45 @@ constexpr Keep operator|(Keep a, Keep b) noexcept {
     return static_cast<Keep>(static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b));
 }
 
-/// Who runs a network: vg_provider.
+/// Device that runs a network: vg_provider.
 enum class Provider : std::int32_t {
     Cpu = VG_PROVIDER_CPU,
     Cuda = VG_PROVIDER_CUDA,
 };
 
-/// Whether a network's weights are laid out anew: vg_prepack.
+/// Whether a network's weights are repacked: vg_prepack.
 enum class Prepack : std::int32_t {
     Auto = VG_PREPACK_AUTO,
     Always = VG_PREPACK_ALWAYS,
     Never = VG_PREPACK_NEVER,
 };
 
-/// Who draws: vg_backend.
+/// Renderer: vg_backend.
 enum class Backend : std::int32_t {
     Auto = VG_BACKEND_AUTO,
     Cpu = VG_BACKEND_CPU,
     Gpu = VG_BACKEND_GPU,
 };
 
-/// What is behind the vehicle: vg_background.
+/// Background: vg_background.
 enum class Background : std::int32_t {
     Color = VG_BACKGROUND_COLOR,
     Transparent = VG_BACKGROUND_TRANSPARENT,
 };
 
-/// What alpha has done to colours: vg_alpha.
+/// Straight or premultiplied alpha: vg_alpha.
 enum class Alpha : std::int32_t {
     Straight = VG_ALPHA_STRAIGHT,
     Premultiplied = VG_ALPHA_PREMULTIPLIED,
 };
 
-/// Which depth a pixel has: vg_depth_mode.
+/// Definition of a pixel's depth: vg_depth_mode.
 enum class DepthMode : std::int32_t {
     Expected = VG_DEPTH_MODE_EXPECTED,
     Accumulated = VG_DEPTH_MODE_ACCUMULATED,
 };
 
-/// How pixels lie in memory: vg_format.
+/// Layout of pixels in memory: vg_format.
 enum class Format : std::int32_t {
     Rgb8 = VG_FORMAT_RGB8,
     Bgr8 = VG_FORMAT_BGR8,
@@ -471,8 +469,8 @@ enum class Heading : std::int32_t {
 
 namespace detail {
 
-/// A number of a C struct that stands for one of the names of one enumeration: takes those names, of vg.hpp and of
-/// vg.h, and no others. It hides the number, which has the same name in the struct that it is a part of.
+/// A field of a C struct that holds an enumerator of one enumeration as a number. Accepts the enumerators of vg.hpp and
+/// of vg.h and no others. It hides the number of the same name in the base struct.
 template <class Choice, class Name, class Number = std::int32_t> class Field {
   public:
     explicit Field(Number &number) noexcept : number_(&number) {}
@@ -499,7 +497,7 @@ template <class Choice, class Name, class Number = std::int32_t> class Field {
 
 // ---- Context
 
-/// Worker threads and scratch memory, for calls that follow each other: `options.context = context.get()`. It
+/// Worker threads and scratch memory that several calls share: `options.context = context.get()`. It
 /// must outlive the calls that use it; any number of threads may use it at a time.
 class Context {
   public:
@@ -518,11 +516,11 @@ class Context {
     }
 
     std::uint32_t threads() const noexcept { return vg_context_threads(handle_.get()); }
-    /// Ends the threads and frees the memory that calls without a context have made for each other.
+    /// Ends the threads and frees the memory that calls without a context share.
     static void free_default() noexcept { vg_default_context_free(); }
 
     vg_context *get() const noexcept { return handle_.get(); }
-    /// The handle, now the caller's to free.
+    /// Releases the handle, which the caller must then free.
     vg_context *release() noexcept { return handle_.release(); }
 
   private:
@@ -551,7 +549,7 @@ inline Result<vg_camera> camera_from_colmap(std::int32_t model, const std::vecto
     });
 }
 
-/// Which of OpenCV's calibrations.
+/// OpenCV's lens models.
 enum class Lens {
     /// cv::calibrateCamera
     Standard,
@@ -559,8 +557,8 @@ enum class Lens {
     Fisheye,
 };
 
-/// OpenCV's calibration: the 3x3 camera matrix, row-major, and 0, 4, 5, 8, 12 or 14 numbers of distortion, see
-/// vg_camera_from_opencv.
+/// A camera from OpenCV's calibration: the 3x3 camera matrix, row-major, and 0, 4, 5, 8, 12 or 14 numbers of
+/// distortion, see vg_camera_from_opencv.
 inline Result<vg_camera> camera_from_opencv(const std::array<double, 9> &k,
                                             const std::vector<double> &distortion, Lens lens,
                                             std::uint32_t width, std::uint32_t height,
@@ -572,7 +570,7 @@ inline Result<vg_camera> camera_from_opencv(const std::array<double, 9> &k,
     });
 }
 
-/// The same camera elsewhere.
+/// The camera with another pose.
 inline vg_camera placed(vg_camera camera, const Pose &vehicle_from_camera) noexcept {
     for (std::size_t i = 0; i < vehicle_from_camera.size(); i++) {
         camera.vehicle_from_camera[i] = vehicle_from_camera[i];
@@ -601,7 +599,7 @@ using Point = std::array<double, 3>;
 /// Column and row.
 using Pixel = std::array<double, 2>;
 
-/// Column and row of a point in the vehicle's frame; an error where the camera has no picture of it.
+/// Column and row of a point in the vehicle's frame; an error if the camera does not see it.
 inline Result<std::array<double, 2>> project(const vg_camera &camera, const Point &point_vehicle) {
     return detail::filled(std::array<double, 2>{}, [&](std::array<double, 2> *out, vg_error **error) {
         return vg_camera_project(&camera, point_vehicle.data(), out->data(), error);
@@ -647,7 +645,7 @@ inline Result<Pose> pose_from_box(const Pose &vehicle_in_ego, const Pose &camera
 
 /// Pixels of points, and their planar depths.
 struct Projected {
-    /// NAN where the camera has no picture of the point.
+    /// NAN where the camera does not see the point.
     std::vector<Pixel> pixels;
     /// Metres; NAN where there is no pixel.
     std::vector<double> depths;
@@ -666,14 +664,14 @@ inline Result<Projected> project(const vg_camera &camera, const std::vector<Poin
     return projected;
 }
 
-/// The point at a planar depth, metres, behind a pixel; an error where the lens has no ray to it.
+/// The point at a planar depth, metres, behind a pixel; an error if the lens defines no ray for it.
 inline Result<Point> unproject(const vg_camera &camera, const Pixel &pixel, double depth_m) {
     return detail::filled(Point{}, [&](Point *out, vg_error **error) {
         return vg_camera_unproject(&camera, pixel.data(), depth_m, out->data(), error);
     });
 }
 
-/// The points behind pixels, one depth each; NAN where the depth means no measurement or the lens has no ray.
+/// The points behind pixels, one depth each; NAN where the depth means no measurement or the lens defines no ray.
 inline Result<std::vector<Point>> unproject(const vg_camera &camera, const std::vector<Pixel> &pixels,
                                             const std::vector<double> &depths) {
     if (pixels.size() != depths.size()) {
@@ -691,7 +689,7 @@ inline Result<std::vector<Point>> unproject(const vg_camera &camera, const std::
     return points;
 }
 
-/// What is up in a picture unless something else is said: the vehicle's z axis.
+/// Default upward direction of a picture: the vehicle's z axis.
 constexpr Point z_up{0, 0, 1};
 
 /// A pose by where the camera stands, a point on its optical axis, and the direction that is up in the picture.
@@ -737,11 +735,11 @@ inline vg_view view(const vg_image &image, const vg_image &mask, const vg_camera
     return view;
 }
 
-/// What of a scene's files is wanted.
+/// Options for reading a scene.
 struct SceneOptions : vg_scene_options {
-    /// The views wanted, in this order, by path, file name or stem; none: all. Used instead of `names`.
+    /// Views to read, in this order, by path, file name or stem; empty: all. Used instead of `names`.
     std::vector<std::string> view_names;
-    /// Told what is legal but looks like a mistake. Used instead of `log`.
+    /// Receives warnings about legal input that looks like a mistake. Used instead of `log`.
     LogCallback on_log;
 
     SceneOptions() noexcept : vg_scene_options{} { vg_scene_options_init(this, sizeof(vg_scene_options)); }
@@ -755,12 +753,12 @@ class Scene {
     Scene() noexcept = default;
     explicit Scene(vg_scene *owned) noexcept : handle_(owned) {}
 
-    /// A nerfstudio scene: a `transforms.json`, or a folder with one.
+    /// Reads a nerfstudio scene: a `transforms.json`, or a folder that holds one.
     static Result<Scene> open_transforms(const std::string &path, const SceneOptions &options = {}) {
         return open(vg_transforms_open, path, options);
     }
 
-    /// A COLMAP folder. `options.vehicle_from_world` is needed.
+    /// Reads a COLMAP folder. `options.vehicle_from_world` is required.
     static Result<Scene> open_colmap(const std::string &path, const SceneOptions &options) {
         return open(vg_colmap_open, path, options);
     }
@@ -790,7 +788,7 @@ class Scene {
     }
 
     const vg_scene *get() const noexcept { return handle_.get(); }
-    /// The handle, now the caller's to free.
+    /// Releases the handle, which the caller must then free.
     vg_scene *release() noexcept { return handle_.release(); }
 
   private:
@@ -818,14 +816,14 @@ class Scene {
 
 // ---- Gaussians
 
-/// Arrays to make Gaussians from.
+/// Arrays from which Gaussians are made.
 struct GaussianArrays : vg_gaussian_arrays {
     GaussianArrays() noexcept : vg_gaussian_arrays{} {
         vg_gaussian_arrays_init(this, sizeof(vg_gaussian_arrays));
     }
 };
 
-/// A set of Gaussians, which never changes. Any number of threads may read or render one at a time.
+/// An immutable set of Gaussians. Any number of threads may read or render one at the same time.
 class Gaussians {
   public:
     using Handle = vg_gaussians;
@@ -833,27 +831,27 @@ class Gaussians {
     Gaussians() noexcept = default;
     explicit Gaussians(vg_gaussians *owned) noexcept : handle_(owned) {}
 
-    /// From a PLY file in the layout of 3D Gaussian Splatting.
+    /// Reads a PLY file in the layout of 3D Gaussian Splatting.
     static Result<Gaussians> load_ply(const std::string &path) {
         return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
             return vg_gaussians_load_ply(path.c_str(), out, error);
         });
     }
 
-    /// From the caller's arrays, which are copied and checked.
+    /// Makes Gaussians from the caller's arrays, which are copied and checked.
     static Result<Gaussians> from_arrays(const vg_gaussian_arrays &arrays) {
         return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
             return vg_gaussians_from_arrays(&arrays, out, error);
         });
     }
 
-    /// As a PLY file in the layout of 3D Gaussian Splatting.
+    /// Writes a PLY file in the layout of 3D Gaussian Splatting.
     Result<void> save_ply(const std::string &path) const {
         return detail::done(
             [&](vg_error **error) { return vg_gaussians_save_ply(handle_.get(), path.c_str(), error); });
     }
 
-    /// From the bytes of such a file.
+    /// Reads the bytes of a PLY file.
     static Result<Gaussians> from_ply(const void *data, std::size_t bytes) {
         return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
             return vg_gaussians_load_ply_memory(data, bytes, out, error);
@@ -863,7 +861,7 @@ class Gaussians {
         return from_ply(bytes.data(), bytes.size());
     }
 
-    /// The bytes of such a file.
+    /// Returns the bytes of a PLY file.
     Result<std::vector<std::uint8_t>> to_ply() const {
         std::vector<std::uint8_t> bytes(vg_gaussians_ply_size(handle_.get()));
         const Result<void> done = detail::done([&](vg_error **error) {
@@ -875,28 +873,28 @@ class Gaussians {
         return bytes;
     }
 
-    /// Those at these indices, in this order; an index may come again.
+    /// The Gaussians at these indices, in this order; an index may be repeated.
     Result<Gaussians> selected(const std::vector<std::size_t> &indices) const {
         return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
             return vg_gaussians_select(handle_.get(), indices.data(), indices.size(), out, error);
         });
     }
 
-    /// Those whose byte is not 0, in order.
+    /// The Gaussians whose byte is not 0, in order.
     Result<Gaussians> masked(const std::vector<std::uint8_t> &keep) const {
         return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
             return vg_gaussians_mask(handle_.get(), keep.data(), keep.size(), out, error);
         });
     }
 
-    /// Those whose centre lies in the box from `low` to `high`, its faces included, in order.
+    /// The Gaussians whose centre lies in the box from `low` to `high`, including its faces, in order.
     Result<Gaussians> cropped(const std::array<double, 3> &low, const std::array<double, 3> &high) const {
         return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
             return vg_gaussians_crop(handle_.get(), low.data(), high.data(), out, error);
         });
     }
 
-    /// Those with a peak opacity of `least` or more, in order.
+    /// The Gaussians with a peak opacity of `least` or more, in order.
     Result<Gaussians> with_opacity_of(float least) const {
         std::vector<std::uint8_t> keep;
         keep.reserve(size());
@@ -918,7 +916,7 @@ class Gaussians {
         return covariances;
     }
 
-    /// The same in another frame: rotation, positive scale, translation in metres.
+    /// The Gaussians in another frame: rotation, positive scale, translation in metres.
     Result<Gaussians> transformed(const Similarity &to_from_vehicle) const {
         return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
             return vg_gaussians_transform(handle_.get(), to_from_vehicle.data(), out, error);
@@ -932,7 +930,7 @@ class Gaussians {
         });
     }
 
-    /// These, then those of `second`, in one.
+    /// These Gaussians followed by those of `second`.
     Result<Gaussians> merged(const Gaussians &second) const {
         return detail::made<Gaussians>([&](vg_gaussians **out, vg_error **error) {
             return vg_gaussians_merge(handle_.get(), second.get(), out, error);
@@ -964,7 +962,7 @@ class Gaussians {
     }
 
     const vg_gaussians *get() const noexcept { return handle_.get(); }
-    /// The handle, now the caller's to free.
+    /// Releases the handle, which the caller must then free.
     vg_gaussians *release() noexcept { return handle_.release(); }
 
   private:
@@ -976,7 +974,7 @@ class Gaussians {
 inline Result<std::vector<vg_camera>> turntable(const Gaussians &gaussians, std::size_t count, std::uint32_t width,
                                                 std::uint32_t height, double elevation_degrees = 12,
                                                 double fov_y_degrees = 35) {
-    // A count of no sensible size is the library's to refuse, before memory is asked for.
+    // A count of no sensible size is refused by the library before memory is allocated.
     std::vector<vg_camera> cameras(count <= 100000 ? count : 0);
     vg_camera none{};
     const Result<void> done = detail::done([&](vg_error **error) {
@@ -993,7 +991,7 @@ inline Result<std::vector<vg_camera>> turntable(const Gaussians &gaussians, std:
 
 namespace detail {
 
-/// vg_model_options with the choices as what they are.
+/// vg_model_options with typed enumerations.
 struct ModelFields : vg_model_options {
     Field<Provider, vg_provider> provider{vg_model_options::provider};
     Field<Prepack, vg_prepack> prepack{vg_model_options::prepack};
@@ -1008,7 +1006,7 @@ struct ModelFields : vg_model_options {
 
 } // namespace detail
 
-/// How a model is opened.
+/// Options for opening a model.
 struct ModelOptions : detail::ModelFields {
     /// ONNX Runtime, the library or its folder; empty: see `runtime`. Used instead of `runtime`.
     std::string runtime_path;
@@ -1035,7 +1033,7 @@ class Model {
     }
 
     const vg_model *get() const noexcept { return handle_.get(); }
-    /// The handle, now the caller's to free.
+    /// Releases the handle, which the caller must then free.
     vg_model *release() noexcept { return handle_.release(); }
 
   private:
@@ -1049,11 +1047,11 @@ struct SegmentOptions : vg_segment_options {
     }
 };
 
-/// The mask of a photograph that has none, by a segmentation network: one byte per pixel, rows without gaps, 255
-/// where the vehicle is that stands at the origin of the camera's vehicle frame.
+/// Computes the mask of a photograph by a segmentation network: one byte per pixel, rows without gaps, 255
+/// for the vehicle at the origin of the camera's vehicle frame.
 inline Result<std::vector<std::uint8_t>> segment(const Model &model, const vg_image &photograph,
                                                  const vg_camera &camera, const SegmentOptions &options = {}) {
-    // A picture of no sensible size is the library's to refuse, before memory is asked for.
+    // A picture of no sensible size is refused by the library before memory is allocated.
     const bool sensible = photograph.width <= 8192 && photograph.height <= 8192;
     std::vector<std::uint8_t> mask(sensible ? std::size_t{photograph.width} * photograph.height : 0);
     const Result<void> made = detail::done([&](vg_error **error) {
@@ -1069,7 +1067,7 @@ inline Result<std::vector<std::uint8_t>> segment(const Model &model, const vg_im
 
 namespace detail {
 
-/// vg_options with the choices as what they are.
+/// vg_options with typed enumerations.
 struct OptionFields : vg_options {
     Field<Prior, vg_prior> prior{vg_options::prior};
     Field<Symmetry, vg_symmetry> symmetry{vg_options::symmetry};
@@ -1095,7 +1093,7 @@ struct Options : detail::OptionFields {
     /// Used instead of `log`.
     LogCallback on_log;
 
-    /// Measured points, metres, vehicle frame: lent, and copied by the call. A temporary is refused.
+    /// Measured points, metres, vehicle frame: borrowed, and copied by the call. A temporary does not compile.
     void lend_cloud(const std::vector<std::array<float, 3>> &measured) noexcept {
         static_assert(sizeof(std::array<float, 3>) == 3 * sizeof(float), "points lie without gaps");
         cloud = measured.empty() ? nullptr : measured.front().data();
@@ -1103,19 +1101,19 @@ struct Options : detail::OptionFields {
     }
     void lend_cloud(const std::vector<std::array<float, 3>> &&) = delete;
 
-    /// Depth from a network: lent, and needed until the call returns. A temporary is refused.
+    /// Depth from a network: borrowed until the call returns. A temporary does not compile.
     void lend_prior(const Model &model) noexcept {
         prior = Prior::Onnx;
         prior_model = model.get();
     }
     void lend_prior(const Model &&) = delete;
 
-    /// Gaussians from a network: lent, and needed until the call returns. A temporary is refused.
+    /// Gaussians from a network: borrowed until the call returns. A temporary does not compile.
     void lend_head(const Model &model) noexcept { head_model = model.get(); }
     void lend_head(const Model &&) = delete;
 };
 
-/// What a reconstruction did.
+/// Report of a reconstruction.
 class Report {
   public:
     using Handle = vg_report;
@@ -1134,8 +1132,8 @@ class Report {
     /// The whole report. Lives as long as the report.
     const char *json() const noexcept { return vg_report_json(handle_.get()); }
 
-    /// Why `figures().verdict` is not `VG_VERDICT_GOOD`, one line; `index` below `figures().reason_count`. Lives as long as
-    /// the report.
+    /// A reason why `figures().verdict` is not `VG_VERDICT_GOOD`, one line; `index` below `figures().reason_count`.
+    /// Lives as long as the report.
     const char *reason(std::size_t index) const noexcept { return vg_report_reason(handle_.get(), index); }
 
     /// Positions of the metric point cloud, metres; none unless `options.points` was 1. `[count][3]`
@@ -1148,20 +1146,20 @@ class Report {
     }
 
     const vg_report *get() const noexcept { return handle_.get(); }
-    /// The handle, now the caller's to free.
+    /// Releases the handle, which the caller must then free.
     vg_report *release() noexcept { return handle_.release(); }
 
   private:
     std::unique_ptr<vg_report, detail::Free> handle_;
 };
 
-/// A vehicle, and how it was made.
+/// A model of a vehicle and the report of its reconstruction.
 struct Reconstruction {
     Gaussians gaussians;
     Report report;
 };
 
-/// Makes a complete vehicle of photographs of one side. The same views and options give the same bytes.
+/// Makes a complete model of a vehicle from photographs of one side. Equal views and options give equal bytes.
 inline Result<Reconstruction> reconstruct(const vg_view *views, std::size_t view_count,
                                           const Options &options = {}) {
     vg_options c_options = options;
@@ -1189,7 +1187,7 @@ inline Result<Reconstruction> reconstruct(const std::vector<vg_view> &views, con
 
 namespace detail {
 
-/// vg_refine_options with the choice as what it is.
+/// vg_refine_options with a typed enumeration.
 struct RefineFields : vg_refine_options {
     Field<Backend, vg_backend> backend{vg_refine_options::backend};
 
@@ -1209,14 +1207,14 @@ struct RefineOptions : detail::RefineFields {
     ProgressCallback on_progress;
 };
 
-/// Gaussians that were refined, and what was done.
+/// Refined Gaussians and the report of the refinement.
 struct Refined {
     Gaussians gaussians;
     vg_refinement refinement;
 };
 
-/// Moves the Gaussians of any model until their pictures are the photographs. The same input and number of steps give
-/// the same bytes.
+/// Optimises the Gaussians of any model so that their pictures match the photographs. Equal input and number of steps
+/// give equal bytes.
 inline Result<Refined> refine(const Gaussians &gaussians, const std::vector<vg_view> &views,
                               const RefineOptions &options = {}) {
     vg_refine_options c_options = options;
@@ -1254,7 +1252,7 @@ struct RenderOptions : vg_render_options {
     }
 };
 
-/// Where a picture goes: the caller's memory.
+/// Destination of a picture: the caller's memory.
 struct ImageTarget : vg_image_target {
     detail::Field<Format, vg_format> color_format{vg_image_target::color_format};
 
@@ -1273,7 +1271,7 @@ struct Picture {
     vg_format format = VG_FORMAT_RGBA8;
     /// `[height][width][channels]`
     std::vector<std::uint8_t> color;
-    /// Planar depth, metres; 0 where nothing is. `[height][width]`
+    /// Planar depth, metres; 0 where there is no Gaussian. `[height][width]`
     std::vector<float> depth;
 };
 
@@ -1291,7 +1289,7 @@ struct RendererOptions : vg_renderer_options {
     }
 };
 
-/// Gaussians made ready to be drawn many times, by the CPU or a graphics processor. It keeps the Gaussians.
+/// Gaussians prepared for rendering many times, on the CPU or a GPU. It keeps the Gaussians.
 class Renderer {
   public:
     using Handle = vg_renderer;
@@ -1305,40 +1303,40 @@ class Renderer {
         });
     }
 
-    /// Who draws.
+    /// The renderer that was chosen.
     vg_backend backend() const noexcept { return static_cast<vg_backend>(vg_renderer_backend(handle_.get())); }
-    /// Who draws, and why, in one line.
+    /// The renderer that was chosen, and why, in one line.
     const char *choice() const noexcept { return vg_renderer_choice(handle_.get()); }
 
-    /// `count` pictures, one per camera, into memory of the caller's.
+    /// Renders `count` pictures, one per camera, into the caller's memory.
     Result<void> render_into(const vg_image_target *targets, const vg_camera *cameras, std::size_t count,
                              const RenderOptions &options = {}) const {
         return detail::done([&](vg_error **error) {
             return vg_renderer_render(handle_.get(), cameras, count, &options, targets, error);
         });
     }
-    /// One picture.
+    /// Renders one picture.
     Result<void> render_into(const vg_image_target &target, const vg_camera &camera,
                              const RenderOptions &options = {}) const {
         return render_into(&target, &camera, 1, options);
     }
 
     vg_renderer *get() const noexcept { return handle_.get(); }
-    /// The handle, now the caller's to free.
+    /// Releases the handle, which the caller must then free.
     vg_renderer *release() noexcept { return handle_.release(); }
 
   private:
     std::unique_ptr<vg_renderer, detail::Free> handle_;
 };
 
-/// Draws Gaussians as a camera sees them into memory of the caller's.
+/// Renders Gaussians from a camera into the caller's memory.
 inline Result<void> render_into(const vg_image_target &target, const Gaussians &gaussians,
                                 const vg_camera &camera, const RenderOptions &options = {}) {
     return detail::done(
         [&](vg_error **error) { return vg_render(gaussians.get(), &camera, &options, &target, error); });
 }
 
-/// Draws Gaussians as a camera sees them. `format`: RGBA8 or BGRA8; RGB8 or BGR8 where the background is
+/// Renders Gaussians from a camera. `format`: RGBA8 or BGRA8; RGB8 or BGR8 where the background is
 /// opaque.
 inline Result<Picture> render(const Gaussians &gaussians, const vg_camera &camera,
                               const RenderOptions &options = {}, vg_format format = VG_FORMAT_RGBA8) {
@@ -1356,7 +1354,7 @@ inline Result<Picture> render(const Gaussians &gaussians, const vg_camera &camer
         return Error{VG_STATUS_ARGUMENT, "format: " + std::to_string(static_cast<std::int32_t>(format)) +
                                              ", allowed: RGB8, BGR8, RGBA8, BGRA8"};
     }
-    // A camera of no sensible size is the library's to refuse, before memory is asked for.
+    // A camera of no sensible size is refused by the library before memory is allocated.
     const bool sensible = camera.width <= 8192 && camera.height <= 8192;
     const std::size_t pixels = sensible ? std::size_t{camera.width} * camera.height : 1;
     Picture picture;
@@ -1387,27 +1385,27 @@ struct ImageGradient : vg_image_gradient {
     }
 };
 
-/// Gradients of a loss with respect to what a picture is made of, laid out as the arrays of `Gaussians`.
+/// Gradients of a loss with respect to Gaussians, background and camera, laid out as the arrays of `Gaussians`.
 struct Gradients {
-    /// Of centres, per metre. `[size][3]`
+    /// Gradient of centres, per metre. `[size][3]`
     std::vector<float> positions;
-    /// Of standard deviations, per metre. `[size][3]`
+    /// Gradient of standard deviations, per metre. `[size][3]`
     std::vector<float> scales;
-    /// Of unit quaternions w, x, y, z, perpendicular to them. `[size][4]`
+    /// Gradient of unit quaternions w, x, y, z, perpendicular to them. `[size][4]`
     std::vector<float> rotations;
-    /// Of peak opacities. `[size]`
+    /// Gradient of peak opacities. `[size]`
     std::vector<float> opacities;
-    /// Of coefficients of spherical harmonics. `[size][(sh_degree + 1)^2][3]`
+    /// Gradient of coefficients of spherical harmonics. `[size][(sh_degree + 1)^2][3]`
     std::vector<float> sh;
-    /// Of the background colour; zero for a transparent one.
+    /// Gradient of the background colour; zero for a transparent one.
     std::array<double, 3> background{};
-    /// Of turning the camera about its axes, per radian, then of moving it along them, per metre.
+    /// Gradient of rotating the camera about its axes, per radian, then of moving it along them, per metre.
     std::array<double, 6> pose{};
-    /// Of the entries of camera_from_vehicle, row-major.
+    /// Gradient of the entries of camera_from_vehicle, row-major.
     std::array<double, 16> view_matrix{};
 };
 
-/// Whether a loss wants the call to go on. Called on the calling thread; must not throw.
+/// Computes a loss and returns whether to continue. Called on the calling thread; must not throw.
 using LossCallback = std::function<Flow()>;
 
 namespace detail {
@@ -1444,8 +1442,8 @@ inline Result<void> render_backward_into(Gradients &out, const Gaussians &gaussi
 
 } // namespace detail
 
-/// Goes back from the gradient of a loss with respect to a picture to those of the Gaussians, the background and the
-/// camera. The picture is drawn again on the way.
+/// Propagates the gradient of a loss with respect to a picture back to the Gaussians, the background and the camera.
+/// The picture is rendered again for that.
 inline Result<Gradients> render_backward(const Gaussians &gaussians, const vg_camera &camera,
                                          const vg_image_gradient &gradient, const RenderOptions &options = {}) {
     Gradients out;
@@ -1456,9 +1454,9 @@ inline Result<Gradients> render_backward(const Gaussians &gaussians, const vg_ca
     return out;
 }
 
-/// Draws a picture into memory of the caller's, has `loss` look at it there and fill the planes of `gradient`, and
-/// goes back: a step of a training loop that draws once. An empty `loss`: the planes are there already. `out` keeps
-/// its memory; after an error it holds nothing in particular.
+/// Renders a picture into the caller's memory, calls `loss`, which reads it there and fills the planes of `gradient`,
+/// and propagates back: a step of a training loop with one render. An empty `loss`: the planes are filled already.
+/// `out` keeps its memory; after an error its contents are unspecified.
 inline Result<void> render_with_gradients(Gradients &out, const vg_image_target &target, const Gaussians &gaussians,
                                           const vg_camera &camera, const vg_image_gradient &gradient,
                                           const LossCallback &loss, const RenderOptions &options = {}) {
@@ -1472,18 +1470,18 @@ inline Result<void> render_with_gradients(Gradients &out, const vg_image_target 
 
 // ---- Metrics
 
-/// Settings of a measure.
+/// Settings of a measurement.
 struct MetricsOptions : vg_metrics_options {
     MetricsOptions() noexcept : vg_metrics_options{} {
         vg_metrics_options_init(this, sizeof(vg_metrics_options));
     }
 
-    /// A network that measures LPIPS: lent, and needed until the call returns. A temporary is refused.
+    /// A network that measures LPIPS: borrowed until the call returns. A temporary does not compile.
     void lend_lpips(const Model &model) noexcept { lpips = model.get(); }
     void lend_lpips(const Model &&) = delete;
 };
 
-/// The difference of two pictures of one size; NAN where a measure does not exist.
+/// The difference of two pictures of one size; NAN where a measure is not defined.
 inline Result<vg_picture_errors> picture_errors(const vg_image &a, const vg_image &b,
                                                 const MetricsOptions &options = {}) {
     vg_picture_errors errors;
@@ -1496,7 +1494,7 @@ inline Result<vg_picture_errors> picture_errors(const vg_image &a, const vg_imag
     return errors;
 }
 
-/// The error of a model, drawn on white, in one photograph; NAN where a measure does not exist.
+/// The error of a model, drawn on white, in one photograph; NAN where a measure is not defined.
 inline Result<vg_view_errors> view_errors(const Gaussians &gaussians, const vg_view &view,
                                           const MetricsOptions &options = {}) {
     vg_view_errors errors;
@@ -1586,8 +1584,8 @@ inline Result<vg_alignment> align_box(const std::vector<vg_view> &views, const W
     });
 }
 
-/// The similarity that takes points of the world, the cameras' centres for one, to where they were measured in the
-/// vehicle's frame, metres; those that contradict the others are left out, which `kept` tells, one element a point.
+/// The similarity that maps points of the world, for example camera centres, to their measured positions in the
+/// vehicle's frame, metres. Outliers are left out; `kept` has an element for each point.
 inline Result<vg_alignment> align_points(const WorldPoints &world, const WorldPoints &vehicle,
                                          std::vector<std::uint8_t> *kept = nullptr) {
     if (world.size() != vehicle.size()) {
@@ -1635,7 +1633,7 @@ inline Error refused(const char *argument, const cv::Mat &mat, const std::string
                                          ", allowed: " + allowed};
 }
 
-/// Three numbers of a row, a column or one element, as OpenCV has rotations and translations.
+/// Three numbers of a row, a column or one element, as OpenCV stores rotations and translations.
 inline Result<std::array<double, 3>> triple(const char *argument, const cv::Mat &mat) {
     if (mat.dims != 2 || mat.total() * static_cast<std::size_t>(mat.channels()) != 3) {
         return refused(argument, mat, "3 numbers in a row or column of CV_64FC1 or CV_32FC1");
@@ -1645,13 +1643,13 @@ inline Result<std::array<double, 3>> triple(const char *argument, const cv::Mat 
     return std::array<double, 3>{numbers.at<double>(0), numbers.at<double>(1), numbers.at<double>(2)};
 }
 
-/// A type of matrix, and what we call its pixels.
+/// A matrix type and the name of its pixel format.
 struct MatFormat {
     int type;
     vg_format format;
 };
 
-/// `mat` in the format that goes with its type. cv::imread leaves an empty one where it cannot read the file.
+/// `mat` in the format of its type. cv::imread returns an empty one if it cannot read the file.
 template <std::size_t N>
 Result<vg_image> lent(const char *argument, const cv::Mat &mat, const MatFormat (&formats)[N],
                       const char *allowed) {
@@ -1669,8 +1667,8 @@ Result<vg_image> lent(const char *argument, const cv::Mat &mat, const MatFormat 
 
 } // namespace detail
 
-/// A cv::Mat whose pixels are lent, not copied: a named one, which must outlive the view. A temporary is
-/// refused, because its pixels would be gone: give a region of a picture (`frame(box)`) a name first.
+/// A cv::Mat whose pixels are borrowed, not copied: a named one, which must outlive the view. A temporary does not
+/// compile, because its pixels would be freed: give a region of a picture (`frame(box)`) a name first.
 class LentMat {
   public:
     LentMat(const cv::Mat &mat) noexcept : mat_(&mat) {}
@@ -1681,21 +1679,21 @@ class LentMat {
     const cv::Mat *mat_;
 };
 
-/// A photograph: CV_8UC3 is BGR, CV_8UC4 is BGRA, CV_8UC1 is gray, as OpenCV has them. Regions of larger
-/// pictures too. Pixels are not copied.
+/// A photograph: CV_8UC3 is BGR, CV_8UC4 is BGRA, CV_8UC1 is gray, as in OpenCV; also regions of larger pictures.
+/// Pixels are not copied.
 inline Result<vg_image> image(LentMat mat) {
     static constexpr detail::MatFormat formats[] = {
         {CV_8UC3, VG_FORMAT_BGR8}, {CV_8UC4, VG_FORMAT_BGRA8}, {CV_8UC1, VG_FORMAT_GRAY8}};
     return detail::lent("image", mat.get(), formats, "CV_8UC3 (BGR), CV_8UC4 (BGRA), CV_8UC1 (gray)");
 }
 
-/// A photograph whose channels were put into another order: RGB8 or RGBA8.
+/// A photograph whose channels are in the other order: RGB8 or RGBA8.
 inline Result<vg_image> image_rgb(LentMat mat) {
     static constexpr detail::MatFormat formats[] = {{CV_8UC3, VG_FORMAT_RGB8}, {CV_8UC4, VG_FORMAT_RGBA8}};
     return detail::lent("image", mat.get(), formats, "CV_8UC3 (RGB), CV_8UC4 (RGBA)");
 }
 
-/// The mask of a photograph that has none, CV_8UC1, by a segmentation network.
+/// Computes the mask of a photograph, CV_8UC1, by a segmentation network.
 inline Result<cv::Mat> segment(const Model &model, LentMat photograph, const vg_camera &camera,
                                const SegmentOptions &options = {}) {
     const Result<vg_image> pixels = image(photograph);
@@ -1725,8 +1723,8 @@ inline Result<vg_image> depth(LentMat mat) {
     return detail::lent("depth", mat.get(), formats, "CV_32FC1 in metres (of other units: vg::metres)");
 }
 
-/// Depth as sensors and PNG files have it, CV_16UC1 in millimetres, as CV_32FC1 in metres; also of floats in other
-/// units. 0 stays 0, no measurement. A view does not copy: give the matrix a name that outlives it.
+/// Converts depth of sensors and PNG files, CV_16UC1 in millimetres, to CV_32FC1 in metres; also floats in other units.
+/// 0 stays 0, no measurement. A view does not copy: give the matrix a name that outlives it.
 ///
 ///     const cv::Mat measured = vg::metres(millimetres).take();
 ///     const auto view = vg::view(photograph, mask, measured, camera);
@@ -1763,7 +1761,7 @@ inline Result<vg_view> view(LentMat photograph, LentMat vehicle_mask, const vg_c
     return view(*pixels, *labels, camera);
 }
 
-/// The same with depth in metres.
+/// A photograph with its mask, depth in metres, and its camera.
 inline Result<vg_view> view(LentMat photograph, LentMat vehicle_mask, LentMat metres,
                             const vg_camera &camera) {
     Result<vg_view> made = view(photograph, vehicle_mask, camera);
@@ -1777,7 +1775,7 @@ inline Result<vg_view> view(LentMat photograph, LentMat vehicle_mask, LentMat me
     return made;
 }
 
-/// OpenCV's calibration as cv::calibrateCamera leaves it: the 3x3 camera matrix, and a row or column of
+/// A camera from the results of cv::calibrateCamera: the 3x3 camera matrix, and a row or column of
 /// distortion.
 inline Result<vg_camera> camera_from_opencv(const cv::Mat &k, const cv::Mat &distortion, Lens lens,
                                             cv::Size size, const Pose &vehicle_from_camera = identity_pose) {
@@ -1819,14 +1817,14 @@ inline Result<Pose> pose_from_opencv(const cv::Mat &rvec, const cv::Mat &tvec,
 
 namespace detail {
 
-/// Matrices that a picture goes into; `depth` and `alpha` NULL: not wanted.
+/// Matrices that receive a picture; `depth` and `alpha` NULL: not requested.
 struct Mats {
     cv::Mat *color;
     cv::Mat *depth;
     cv::Mat *alpha;
 };
 
-/// What of `mat` is drawn into: itself, or one of the camera's size and this type where it is empty.
+/// The matrix to draw into: `mat` itself, or if it is empty, a new one of the camera's size and this type.
 inline Result<cv::Mat> drawn_into(const char *argument, const cv::Mat &mat, const vg_camera &camera,
                                   std::initializer_list<int> types, const char *allowed) {
     const int columns = static_cast<int>(camera.width), rows = static_cast<int>(camera.height);
@@ -1842,7 +1840,7 @@ inline Result<cv::Mat> drawn_into(const char *argument, const cv::Mat &mat, cons
                    std::to_string(columns) + "x" + std::to_string(rows) + " of " + allowed + ", or empty");
 }
 
-/// R and B of a CV_32FC4 exchanged: the library has RGBA, OpenCV BGRA.
+/// Exchanges R and B of a CV_32FC4: the library uses RGBA, OpenCV BGRA.
 inline void exchange_red_and_blue(cv::Mat &mat) {
     for (int row = 0; row < mat.rows; row++) {
         float *pixel = mat.ptr<float>(row);
@@ -1852,7 +1850,7 @@ inline void exchange_red_and_blue(cv::Mat &mat) {
     }
 }
 
-/// Draws into matrices of the cameras' sizes, or makes them where they are empty. `draw` takes targets and cameras.
+/// Renders into matrices of the cameras' sizes, and creates those that are empty. `draw` takes targets and cameras.
 template <class Draw>
 Result<void> render_mats(const Mats *mats, const vg_camera *cameras, std::size_t count,
                          const RenderOptions &options, const Draw &draw) {
@@ -1902,13 +1900,13 @@ Result<void> render_mats(const Mats *mats, const vg_camera *cameras, std::size_t
             target.alpha_row_stride = opacity.step;
         }
     }
-    // An array of vg.h's structs, without what vg.hpp adds to each.
+    // An array of vg.h's structs, without the members that vg.hpp adds.
     const std::vector<vg_image_target> c_targets(targets.begin(), targets.end());
     const Result<void> drawn = draw(c_targets.data(), cameras, count);
     if (!drawn) {
         return drawn;
     }
-    // The caller's were as they are until the pictures were there.
+    // The caller's matrices are assigned only after all pictures were drawn.
     for (std::size_t i = 0; i < count; i++) {
         auto &[picture, metres, opacity] = pictures[i];
         if (picture.type() == CV_32FC4) {
@@ -1943,8 +1941,8 @@ inline Result<void> render_mats(const Mats &mats, const Renderer &renderer, cons
 
 } // namespace detail
 
-/// Draws Gaussians, or with a Renderer what it was made of, into a matrix, which may be a region of a larger one:
-/// CV_8UC3 (BGR), CV_8UC4 (BGRA) or CV_32FC4 (BGRA, 0 to 1, not clamped above 1) of the camera's size. An empty one
+/// Renders Gaussians, or the Gaussians of a Renderer, into a matrix, which may be a region of a larger one: CV_8UC3
+/// (BGR), CV_8UC4 (BGRA) or CV_32FC4 (BGRA, 0 to 1, not clamped above 1) of the camera's size. An empty matrix
 /// becomes CV_8UC3, or CV_8UC4 where the background is transparent.
 template <class Model>
 Result<void> render_into(cv::Mat &color, const Model &model, const vg_camera &camera,
@@ -1952,22 +1950,22 @@ Result<void> render_into(cv::Mat &color, const Model &model, const vg_camera &ca
     return detail::render_mats({&color, nullptr, nullptr}, model, camera, options);
 }
 
-/// The same with planar depth in metres: CV_32FC1 of the camera's size, or empty.
+/// Renders colour and planar depth in metres: CV_32FC1 of the camera's size, or empty.
 template <class Model>
 Result<void> render_into(cv::Mat &color, cv::Mat &depth, const Model &model, const vg_camera &camera,
                          const RenderOptions &options = {}) {
     return detail::render_mats({&color, &depth, nullptr}, model, camera, options);
 }
 
-/// The same with alpha too, 0 to 1: CV_32FC1 of the camera's size, or empty.
+/// Renders colour, depth and alpha, 0 to 1: CV_32FC1 of the camera's size, or empty.
 template <class Model>
 Result<void> render_into(cv::Mat &color, cv::Mat &depth, cv::Mat &alpha, const Model &model,
                          const vg_camera &camera, const RenderOptions &options = {}) {
     return detail::render_mats({&color, &depth, &alpha}, model, camera, options);
 }
 
-/// One picture per camera in one call; a graphics processor draws the next while one is read. `colors` becomes as long
-/// as `cameras`.
+/// Renders one picture per camera in one call; a GPU renders the next one while one is read back. `colors` becomes as
+/// long as `cameras`.
 inline Result<void> render_into(std::vector<cv::Mat> &colors, const Renderer &renderer,
                                 const std::vector<vg_camera> &cameras, const RenderOptions &options = {}) {
     std::vector<cv::Mat> drawn(colors);
@@ -2041,7 +2039,7 @@ template <class Derived> Similarity similarity(const Eigen::MatrixBase<Derived> 
     return similarity;
 }
 
-/// Where a camera stands.
+/// The position of a camera.
 inline Eigen::Isometry3d isometry(const vg_camera &camera) {
     Eigen::Isometry3d isometry = Eigen::Isometry3d::Identity();
     for (int row = 0; row < 3; row++) {
@@ -2052,7 +2050,7 @@ inline Eigen::Isometry3d isometry(const vg_camera &camera) {
     return isometry;
 }
 
-/// An array as a matrix of one row per element, not copied: `vg::rows<3>(car.positions())`.
+/// Maps an array as a matrix of one row per element, without copying: `vg::rows<3>(car.positions())`.
 template <int Columns, class T>
 Eigen::Map<const Eigen::Matrix<T, Eigen::Dynamic, Columns, Columns == 1 ? Eigen::ColMajor : Eigen::RowMajor>>
 rows(const Span<const T> &array) {

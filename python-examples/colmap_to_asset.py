@@ -1,11 +1,10 @@
-"""A COLMAP reconstruction, read by pycolmap, to a PLY file of Gaussians.
+"""Makes a PLY file of Gaussians from a COLMAP reconstruction that is read by pycolmap.
 
     python colmap_to_asset.py [FOLDER] [-o car.ply] [--vehicle-from-world FILE] [--views NAME ...]
 
-FOLDER holds sparse/0, images/ and masks/ (white is vehicle, same name as the image with .png); the sample of this
-repository if not given. COLMAP's world lies anywhere and has any scale: FILE holds the similarity (4x4, JSON) to the
-vehicle's frame, FOLDER/vehicle_from_world.json if not given. vg.similarity_from_points makes it from camera centres
-that were measured.
+FOLDER holds sparse/0, images/ and masks/ (white is vehicle, same name as the image with .png); default: the sample of
+this repository. COLMAP's world has an arbitrary pose and scale: FILE holds the similarity (4x4, JSON) to the vehicle's
+frame, by default FOLDER/vehicle_from_world.json. vg.similarity_from_points makes it from measured camera centres.
 """
 
 from __future__ import annotations

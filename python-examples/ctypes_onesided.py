@@ -1,9 +1,9 @@
-"""The unseen side of a vehicle through the C interface alone: ctypes, NumPy, and Pillow for the pictures.
+"""Renders the unseen side of a vehicle through the C interface: ctypes, NumPy, and Pillow for the pictures.
 
     python ctypes_onesided.py [SCENE] [-o FOLDER]
 
-SCENE is a folder with images/, masks/ and a transforms.json in nerfstudio's format; the sample of this repository if
-not given. Its split.json says which views are shown to the library, and which are drawn into FOLDER.
+SCENE is a folder with images/, masks/ and a transforms.json in nerfstudio's format; default: the sample of this
+repository. Its split.json lists the input views and the test views, which are rendered into FOLDER.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def main() -> None:
 
 
 def camera(frame: dict[str, Any]) -> capi.vg_camera:
-    """A pinhole of transforms.json."""
+    """A pinhole camera from transforms.json."""
     params = [frame["fl_x"], frame["fl_y"], frame["cx"], frame["cy"]]
     pose = capi.pose_from_opengl(frame["transform_matrix"])
     return capi.camera_from_colmap("PINHOLE", frame["w"], frame["h"], params, pose)

@@ -1,9 +1,9 @@
-"""A model that was perturbed, fitted back to pictures with PyTorch.
+"""Fits a perturbed model back to pictures with PyTorch.
 
     python fit_with_torch.py [SCENE] [--steps N] [-o FILE]
 
-SCENE is a folder as open_scene takes it; the sample of this repository if not given. Its reconstruction is drawn,
-shaken, and pulled back to those pictures by Adam.
+SCENE is a folder for open_scene; default: the sample of this repository. Its reconstruction is rendered, perturbed, and
+fitted back to those pictures by Adam.
 """
 
 from __future__ import annotations

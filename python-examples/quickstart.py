@@ -1,9 +1,9 @@
-"""Photographs of one side of a vehicle in, a picture of its other side out.
+"""Renders the other side of a vehicle from photographs of one side.
 
     python quickstart.py [SCENE] [-o FOLDER]
 
-SCENE is a folder with a transforms.json; the sample of this repository if not given. If it has a split.json, only the
-views it names as input are used. Leaves car.ply, unseen.png and, made with Matplotlib, quickstart.png in FOLDER.
+SCENE is a folder with a transforms.json; default: the sample of this repository. If it has a split.json, only its input
+views are used. Writes car.ply, unseen.png and, with Matplotlib, quickstart.png into FOLDER.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def inputs(scene: Path) -> list[str] | None:
 
 
 def other_side(camera: vg.Camera) -> vg.Camera:
-    """The camera mirrored across the plane of symmetry, y = 0; its columns too, so that it stays a camera."""
+    """The camera mirrored across the plane of symmetry, y = 0; its columns are mirrored too, to keep a rotation."""
     pose = camera.vehicle_from_camera
     pose[1] *= -1
     pose[:, 0] *= -1

@@ -23,12 +23,12 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 PACKAGE = HERE / "python" / "vehicle_gaussians"
 LICENCES = ("LICENSE-MIT", "LICENSE-APACHE")
-#: What can be built in beside what is always there.
+#: Optional features.
 FEATURES = ("gpu", "onnx")
 
 
 def features_of(config_settings: Any) -> list[str]:
-    """The features that the caller of pip asked for, separated by commas."""
+    """The features that were requested through pip, separated by commas."""
     wanted = [name for name in ((config_settings or {}).get("features") or "").split(",") if name]
     for name in wanted:
         if name not in FEATURES:
@@ -37,7 +37,7 @@ def features_of(config_settings: Any) -> list[str]:
 
 
 def for_maturin(config_settings: Any) -> Any:
-    """The settings in maturin's words."""
+    """The settings as arguments of maturin."""
     features = features_of(config_settings)
     if not features:
         return config_settings
@@ -48,7 +48,7 @@ def for_maturin(config_settings: Any) -> Any:
 
 
 def prepare(config_settings: Any = None) -> None:
-    """Puts the shared library, the header and the licences where maturin takes them from."""
+    """Copies the shared library, the header and the licences to where maturin reads them."""
     check_checkout()
     library = build_library(features_of(config_settings))
     fill(PACKAGE / "lib", [library])
@@ -85,7 +85,7 @@ def build_library(features: list[str]) -> Path:
 
 
 def find_cargo() -> str:
-    """Cargo, before maturin looks for it: without one maturin tries to install Rust, and ends in a traceback."""
+    """Checks for cargo, because without it maturin tries to install Rust and fails with a traceback."""
     cargo = shutil.which("cargo")
     if cargo is None:
         sys.exit(
@@ -96,7 +96,7 @@ def find_cargo() -> str:
 
 
 def fill(folder: Path, files: list[Path]) -> None:
-    """Makes `folder` hold these files and no others."""
+    """Makes `folder` contain exactly these files."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     for file in files:
@@ -104,7 +104,7 @@ def fill(folder: Path, files: list[Path]) -> None:
 
 
 def maturin() -> Any:
-    import maturin  # only there while a build runs
+    import maturin  # only installed while a build runs
 
     return maturin
 

@@ -9,7 +9,7 @@ use super::overlap::{self, Written};
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
 use super::view::vg_view;
-use super::watched::{Told, watched};
+use super::watched::{ProgressCallback, watched};
 use glam::DVec3;
 use std::ffi::{c_char, c_void};
 use vg::align::{self, Heading};
@@ -157,8 +157,8 @@ pub unsafe extern "C" fn vg_align_scan(
             read::not_null("out", out, "where to put the alignment")?;
             let options = read::optional("options", options)?;
             let heading = options.heading()?;
-            let found = in_context(options.context, |shop| {
-                watched(shop, "align", options.progress(), |watch| {
+            let found = in_context(options.context, |context| {
+                watched(context, "align", options.progress(), |watch| {
                     align::to_scan_watched(&views, &sparse, &scan, heading, watch)
                 })
             });
@@ -195,8 +195,8 @@ pub unsafe extern "C" fn vg_align_box(
             read::not_null("out", out, "where to put the alignment")?;
             let options = read::required("options", options)?;
             let heading = options.heading()?;
-            let found = in_context(options.context, |shop| {
-                watched(shop, "align", options.progress(), |watch| {
+            let found = in_context(options.context, |context| {
+                watched(context, "align", options.progress(), |watch| {
                     align::to_box_watched(&views, &sparse, size, heading, watch)
                 })
             });
@@ -282,8 +282,8 @@ pub unsafe extern "C" fn vg_align_folder(
             read::not_null("out", out, "where to put the alignment")?;
             let options = read::optional("options", options)?;
             let heading = options.heading()?;
-            let found = in_context(options.context, |shop| {
-                watched(shop, "align", options.progress(), |watch| {
+            let found = in_context(options.context, |context| {
+                watched(context, "align", options.progress(), |watch| {
                     align::folder_to_scan_watched(path, scan, heading, watch)
                 })
             });
@@ -294,9 +294,9 @@ pub unsafe extern "C" fn vg_align_folder(
 }
 
 impl vg_align_options {
-    /// Whom to tell how far the call is.
-    fn progress(&self) -> Told {
-        Told { callback: self.progress, user: self.progress_user }
+    /// The callback for progress.
+    fn progress(&self) -> ProgressCallback {
+        ProgressCallback { function: self.progress, user: self.progress_user }
     }
 
     pub(super) fn heading(&self) -> Result<Heading> {
@@ -348,7 +348,7 @@ fn as_in_c(error: Error) -> Error {
     read::renamed(error, &[("heading", "options.heading")])
 }
 
-/// Cameras and masks; pictures are black.
+/// Reads cameras and masks; pictures are black.
 unsafe fn masked(views: *const vg_view, count: usize) -> Result<Vec<View>> {
     if !(1..=MAX_VIEWS).contains(&count) {
         return Err(Error::argument("view_count", count.to_string(), format!("1 to {MAX_VIEWS}")));
@@ -369,7 +369,7 @@ unsafe fn masked(views: *const vg_view, count: usize) -> Result<Vec<View>> {
     views.iter().enumerate().map(view).collect()
 }
 
-/// `count` points, `[count][3]`, at least `fewest`.
+/// Reads `count` points, `[count][3]`, at least `fewest`.
 unsafe fn points(
     argument: &str,
     pointer: *const f64,

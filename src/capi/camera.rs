@@ -100,7 +100,7 @@ impl vg_camera {
     }
 }
 
-/// A camera read and checked; `argument` names it in errors.
+/// Reads and checks a camera; `argument` names it in errors.
 pub(super) fn camera(argument: &str, camera: &vg_camera) -> Result<Camera> {
     let field = |name: &str| format!("{argument}.{name}");
     if camera.struct_size != size_of::<vg_camera>() {
@@ -132,7 +132,7 @@ fn model(argument: &str, id: i32) -> Result<CameraModel> {
     })
 }
 
-/// A pose in the world, moved to the vehicle's frame by an optional similarity.
+/// Transforms a pose from the world to the vehicle's frame by an optional similarity.
 unsafe fn in_vehicle(world_from_camera: Pose, vehicle_from_world: *const f64) -> Result<Pose> {
     if vehicle_from_world.is_null() {
         return Ok(world_from_camera);
@@ -418,7 +418,7 @@ pub unsafe extern "C" fn vg_camera_project(
             let pixel = camera.pixel_from_vehicle(point).ok_or_else(|| {
                 let along = camera.vehicle_from_camera.inverse().transform_point(point).z;
                 let found = format!("{point}, {along} m along the optical axis");
-                let allowed = "a finite point in front of the camera, where its lens has a picture of it";
+                let allowed = "a finite point in front of the camera and within the range of its lens";
                 Error::argument("point_vehicle", found, allowed)
             })?;
             out_pixel.cast::<[f64; 2]>().write_unaligned(pixel);

@@ -1,4 +1,4 @@
-//! What outlives a call: worker threads and the renderer's memory, in the caller's contexts and in the process's own.
+//! Resources that outlive a call: worker threads and the renderer's memory, in contexts of the caller or the process.
 
 use super::guard::{clear, free, guarded, guarded_value};
 use super::read::{self, Versioned};
@@ -45,22 +45,22 @@ unsafe impl Versioned for vg_context_options {
     }
 }
 
-/// What a `vg_context` points to.
-type ContextObject = OfProcess<Workshop>;
+/// Type that a `vg_context` points to.
+type ContextObject = OfProcess<CallContext>;
 
-/// What a call works with.
-pub(super) struct Workshop {
+/// Resources of a call.
+pub(super) struct CallContext {
     pub(super) threads: Threads,
     pub(super) renderer: CpuRenderer,
     pub(super) pictures: Spare<Rendered>,
     pub(super) bytes: Spare<Rgba8>,
 }
 
-/// Memory that is kept from call to call, as often as there were calls at a time.
+/// Memory that is kept from call to call, one item for each call that ran at the same time.
 #[derive(Default)]
 pub(super) struct Spare<T>(Mutex<Vec<T>>);
 
-impl Workshop {
+impl CallContext {
     pub(super) fn new(threads: usize) -> Result<Self> {
         let threads = Threads::new(threads)?;
         Ok(Self {
@@ -73,9 +73,9 @@ impl Workshop {
 }
 
 impl<T: Default> Spare<T> {
-    /// Runs `work` with memory that is kept for the next time.
+    /// Runs `work` with memory that is kept for the next call.
     pub(super) fn lend<R>(&self, work: impl FnOnce(&mut T) -> R) -> R {
-        // A panic elsewhere cannot leave a list of spare memory in a state that matters.
+        // A panic elsewhere cannot leave the list of spare memory in an invalid state.
         let mut memory = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
         let result = work(&mut memory);
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(memory);
@@ -83,62 +83,62 @@ impl<T: Default> Spare<T> {
     }
 }
 
-/// The context of calls that name none.
+/// The context of calls whose options name no context.
 struct DefaultContext {
-    /// The process whose calls they are.
+    /// Identifier of the process that made it.
     process: u32,
-    /// `None` before the first call, and after it was freed.
-    workshop: Mutex<Option<Arc<Workshop>>>,
+    /// `None` before the first call and after it was freed.
+    context: Mutex<Option<Arc<CallContext>>>,
 }
 
 impl DefaultContext {
-    /// That of this process. A fork begins with a new one: the parent's lock may have been held when it forked, and its
-    /// threads stayed in the parent.
+    /// The default context of this process. A fork makes a new one: the parent's lock may have been held at the fork,
+    /// and its threads exist only in the parent.
     fn here() -> &'static Self {
         static HERE: AtomicPtr<DefaultContext> = AtomicPtr::new(null_mut());
         let process = process::id();
         loop {
             let found = HERE.load(Ordering::Acquire);
-            // SAFETY: what was stored is never freed, and reached through shared references only.
+            // SAFETY: a stored context is never freed, and is only reached through shared references.
             match unsafe { found.as_ref() } {
                 Some(context) if context.process == process => return context,
                 _ => {}
             }
-            let new = Box::into_raw(Box::new(Self { process, workshop: Mutex::default() }));
+            let new = Box::into_raw(Box::new(Self { process, context: Mutex::default() }));
             if HERE.compare_exchange(found, new, Ordering::AcqRel, Ordering::Acquire).is_err() {
-                // SAFETY: another thread was first; nobody has seen this one.
+                // SAFETY: another thread stored its context first; this one was never shared.
                 drop(unsafe { Box::from_raw(new) });
             }
         }
     }
 
-    /// What calls work with, made by the first.
-    fn workshop(&self) -> Result<Arc<Workshop>> {
-        // A panic elsewhere leaves the one or none.
-        let mut held = self.workshop.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(workshop) = &*held {
-            return Ok(Arc::clone(workshop));
+    /// The resources of calls, which the first call makes.
+    fn context(&self) -> Result<Arc<CallContext>> {
+        // A panic elsewhere leaves either a complete context or `None`.
+        let mut held = self.context.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(context) = &*held {
+            return Ok(Arc::clone(context));
         }
-        let made = Arc::new(Workshop::new(0)?);
+        let made = Arc::new(CallContext::new(0)?);
         *held = Some(Arc::clone(&made));
         Ok(made)
     }
 
     fn free(&self) {
-        let held = self.workshop.lock().unwrap_or_else(PoisonError::into_inner).take();
-        // Not while holding the lock: threads are joined, unless a call still uses them.
+        let held = self.context.lock().unwrap_or_else(PoisonError::into_inner).take();
+        // Dropped after the lock is released, because dropping joins the threads unless a call still uses them.
         drop(held);
     }
 }
 
-/// Runs `work` in the caller's context, or in the process's own where it is NULL.
+/// Runs `work` in the caller's context, or in the default context if it is NULL.
 pub(super) unsafe fn in_context<T>(
     context: *const vg_context,
-    work: impl FnOnce(&Workshop) -> Result<T>,
+    work: impl FnOnce(&CallContext) -> Result<T>,
 ) -> Result<T> {
     match unsafe { context.cast::<ContextObject>().as_ref() } {
         Some(context) => work(context.get("options.context")?),
-        None => work(&*DefaultContext::here().workshop()?),
+        None => work(&*DefaultContext::here().context()?),
     }
 }
 
@@ -165,9 +165,9 @@ pub unsafe extern "C" fn vg_context_new(
             read::not_null("out", out, "where to put the context")?;
             let options = read::optional("options", options)?;
             read::zero("options.flags", options.flags == 0)?;
-            let workshop = Workshop::new(options.threads as usize)
+            let context = CallContext::new(options.threads as usize)
                 .map_err(|e| read::renamed(e, &[("threads", "options.threads")]))?;
-            out.write(Box::into_raw(Box::new(OfProcess::new(workshop))).cast());
+            out.write(Box::into_raw(Box::new(OfProcess::new(context))).cast());
             Ok(())
         })
     }

@@ -18,10 +18,10 @@ pub struct vg_gaussians {
     _private: [u8; 0],
 }
 
-/// Most Gaussians one handle holds.
+/// Largest number of Gaussians in one handle.
 const MAX_COUNT: usize = i32::MAX as usize;
 
-/// What the library and C call the arrays.
+/// Names of the arrays in the library and in C.
 const ARRAYS: [(&str, &str); 5] = [
     ("means", "arrays.positions"),
     ("scales", "arrays.scales"),
@@ -30,12 +30,12 @@ const ARRAYS: [(&str, &str); 5] = [
     ("sh", "arrays.sh"),
 ];
 
-/// A handle is a count of one on an `Arc`: a renderer may outlive it.
+/// Makes a handle, which is one count of an `Arc`: a renderer may outlive it.
 pub(super) fn into_raw(gaussians: Gaussians) -> *mut vg_gaussians {
     Arc::into_raw(Arc::new(gaussians)).cast_mut().cast()
 }
 
-/// The same Gaussians, kept as long as somebody has them.
+/// Shares the Gaussians of a handle, which then live as long as the last reference.
 pub(super) unsafe fn shared(argument: &str, gaussians: *const vg_gaussians) -> Result<Arc<Gaussians>> {
     unsafe {
         required(argument, gaussians)?;

@@ -207,43 +207,46 @@ pub unsafe extern "C" fn vg_render_backward(
             let out = Arrays::read(out, gaussians)?;
             let picture = target.as_ref().map_or(Vec::new(), |target| target.written("target"));
             overlap::refuse(&[picture, out.written(gaussians)].concat())?;
-            let mut of_picture =
+            let mut picture_gradient =
                 PictureGradient { width: camera.width, height: camera.height, ..Default::default() };
             if planes.loss.is_none() {
-                planes.copy(&mut of_picture)?;
+                planes.copy(&mut picture_gradient)?;
             }
-            in_context(options.context, |shop| {
+            in_context(options.context, |context| {
                 let Some(target) = target else {
                     let back = |watch: &Watch| match &device {
-                        Some(device) => device.backward(gaussians, &camera, &settings, &of_picture),
-                        None => {
-                            shop.renderer.watched(watch).backward(gaussians, &camera, &settings, &of_picture)
-                        }
+                        Some(device) => device.backward(gaussians, &camera, &settings, &picture_gradient),
+                        None => context.renderer.watched(watch).backward(
+                            gaussians,
+                            &camera,
+                            &settings,
+                            &picture_gradient,
+                        ),
                     };
-                    out.write(&watched(shop, "render", options.progress(), back)?);
+                    out.write(&watched(context, "render", options.progress(), back)?);
                     return Ok(());
                 };
-                let renderer = device.as_deref().unwrap_or(&shop.renderer);
-                shop.pictures.lend(|picture| {
+                let renderer = device.as_deref().unwrap_or(&context.renderer);
+                context.pictures.lend(|picture| {
                     let mut gradients = Gradients::default();
-                    let lent = Lent(&target, &planes);
+                    let lent = CallerMemory(&target, &planes);
                     let draw = |ask: &dyn Fn(()) -> i32| {
-                        let Lent(target, planes) = lent.get();
-                        let targets = (&mut *picture, &mut of_picture, &mut gradients);
-                        let mut loss = |picture: &Rendered, of_picture: &mut PictureGradient| {
+                        let CallerMemory(target, planes) = lent.get();
+                        let targets = (&mut *picture, &mut picture_gradient, &mut gradients);
+                        let mut loss = |picture: &Rendered, picture_gradient: &mut PictureGradient| {
                             if planes.loss.is_some() {
                                 target.write(picture);
                                 if ask(()) != 0 {
                                     return Err(Error::Cancelled { stage: "loss" });
                                 }
                             }
-                            // What was copied before is no longer there: the renderer empties it.
-                            planes.copy(of_picture)
+                            // Copied again, because the renderer clears an earlier copy.
+                            planes.copy(picture_gradient)
                         };
                         renderer.forward_backward(gaussians, &camera, &settings, targets, &mut loss)
                     };
                     let on_this_thread = |()| planes.loss.map_or(0, |loss| loss(planes.loss_user));
-                    shop.threads.run_asking(draw, on_this_thread)?;
+                    context.threads.run_asking(draw, on_this_thread)?;
                     if planes.loss.is_none() {
                         target.write(picture);
                     }
@@ -255,17 +258,17 @@ pub unsafe extern "C" fn vg_render_backward(
     }
 }
 
-/// The caller's memory on a worker thread, while the thread that was lent it waits.
+/// The caller's memory for use on a worker thread while the calling thread waits.
 #[derive(Clone, Copy)]
-struct Lent<'a>(&'a Target, &'a Planes);
+struct CallerMemory<'a>(&'a Target, &'a Planes);
 
 // SAFETY: pointers into memory that the caller promised for the length of the call, and that nobody else uses: the
 // calling thread waits, or runs the caller's own `loss` while the worker waits for it.
-unsafe impl Send for Lent<'_> {}
-unsafe impl Sync for Lent<'_> {}
+unsafe impl Send for CallerMemory<'_> {}
+unsafe impl Sync for CallerMemory<'_> {}
 
-impl<'a> Lent<'a> {
-    /// A method, so that a closure takes the whole of it along.
+impl<'a> CallerMemory<'a> {
+    /// A method, so that a closure captures the whole struct instead of its fields.
     fn get(self) -> Self {
         self
     }
@@ -274,7 +277,7 @@ impl<'a> Lent<'a> {
 /// A plane of a picture in the caller's memory: its first byte, and the bytes from row to row.
 type Plane = Option<(*const u8, usize)>;
 
-/// The caller's gradient of a picture, checked but for the numbers in it.
+/// The caller's gradient of a picture; all is checked except its numbers.
 struct Planes {
     color: Plane,
     alpha: Plane,
@@ -318,13 +321,13 @@ impl Planes {
             return Err(Error::argument("gradient", found, "at least one of them"));
         }
         if planes.loss.is_some() && !has_target {
-            let allowed = "a vg_image_target, for gradient.loss to look at";
+            let allowed = "a vg_image_target, because gradient.loss reads the picture";
             return Err(Error::argument("target", "NULL", allowed));
         }
         Ok(planes)
     }
 
-    /// The numbers, of which the first that is not finite is an error.
+    /// Copies the numbers; the first one that is not finite is an error.
     unsafe fn copy(&self, to: &mut PictureGradient) -> Result<()> {
         let width = to.width as usize;
         unsafe {
@@ -342,7 +345,7 @@ impl Planes {
     }
 }
 
-/// Row by row, through copies of one row each: nothing is known of the gaps, and of the address.
+/// Copies row by row, because the gaps between rows must not be read and the address may be unaligned.
 unsafe fn copy<T: bytemuck::Pod>(
     name: &str,
     (first, stride): (*const u8, usize),
@@ -369,10 +372,10 @@ impl Arrays {
     unsafe fn read(out: *const vg_gradients, gaussians: &Gaussians) -> Result<Self> {
         let out = unsafe { read::required("out", out)? };
         read::zero("out.flags", out.flags == 0)?;
-        let of_gaussians = [out.positions, out.scales, out.rotations, out.opacities, out.sh];
-        let of_all = [out.background, out.pose, out.view_matrix];
-        let wants_gaussians = of_gaussians.iter().any(|array| !array.is_null());
-        if !wants_gaussians && of_all.iter().all(|array| array.is_null()) {
+        let gaussian_arrays = [out.positions, out.scales, out.rotations, out.opacities, out.sh];
+        let other_arrays = [out.background, out.pose, out.view_matrix];
+        let wants_gaussians = gaussian_arrays.iter().any(|array| !array.is_null());
+        if !wants_gaussians && other_arrays.iter().all(|array| array.is_null()) {
             return Err(Error::argument("out", "no array", "at least one of them"));
         }
         if wants_gaussians && out.count != gaussians.len() {
@@ -415,7 +418,7 @@ impl Arrays {
     }
 }
 
-/// At any address; nowhere where it is NULL.
+/// Writes to any address, aligned or not; does nothing if it is NULL.
 unsafe fn write<T: Copy>(to: *mut T, values: &[T]) {
     if !to.is_null() {
         unsafe {

@@ -1,4 +1,4 @@
-//! The panic guard: a panic becomes a status with its message and place; it never crosses, and never prints.
+//! The panic guard: a panic becomes a status with its message and place; it never unwinds into C, and never prints.
 
 use super::status::{vg_error, vg_status};
 use std::any::Any;
@@ -9,9 +9,9 @@ use std::sync::{Mutex, Once, PoisonError};
 use vg::Error;
 use vg::threads::THREAD_NAME;
 
-/// Why a function of the C face did not do what it was asked.
+/// Failure of a function of the C interface.
 pub(super) enum Failure {
-    /// The library said no.
+    /// The library returned an error.
     Refused(Error),
     /// The library has a bug.
     Panicked(String),
@@ -33,7 +33,7 @@ pub(super) unsafe fn guarded(
     let Err(failure) = caught(body).and_then(|done| done.map_err(Failure::from)) else {
         return vg_status::Ok;
     };
-    // Making the error object may itself fail to allocate, which aborts; there is nothing left to do then.
+    // Allocating the error object may itself fail, which aborts the process.
     let error = vg_error::new(failure);
     let status = error.status();
     if out_error.is_null() {
@@ -44,20 +44,20 @@ pub(super) unsafe fn guarded(
     status
 }
 
-/// Runs the body of a function that returns a value and cannot fail but by a bug; then it returns `fallback`.
+/// Runs the body of a function that returns a value and fails only by a bug; returns `fallback` if it panics.
 pub(super) fn guarded_value<T>(fallback: T, body: impl FnOnce() -> T) -> T {
     let _errno = Errno::kept();
     caught(body).unwrap_or(fallback)
 }
 
-/// Sets an out parameter to NULL, where there is one.
+/// Sets an out parameter to NULL, if there is one.
 pub(super) unsafe fn clear<T>(out: *mut *mut T) {
     if !out.is_null() {
         unsafe { out.write(std::ptr::null_mut()) };
     }
 }
 
-/// Frees what a handle points to, whose type is `T`; NULL is nothing.
+/// Frees the `T` that a handle points to; does nothing for NULL.
 pub(super) unsafe fn free<T>(handle: *mut T) {
     guarded_value((), || {
         if !handle.is_null() {
@@ -66,7 +66,7 @@ pub(super) unsafe fn free<T>(handle: *mut T) {
     });
 }
 
-/// Puts errno back: the calls of the system that the library makes are nothing to the caller.
+/// Restores errno when dropped: the library's system calls must not change the caller's errno.
 struct Errno {
     #[cfg(unix)]
     was: i32,
@@ -99,7 +99,7 @@ fn caught<T>(body: impl FnOnce() -> T) -> Result<T, Failure> {
     catch_unwind(|| {
         #[cfg(test)]
         injection::fire();
-        // The whole wrapper moves in, not the closure inside it.
+        // Captures the whole wrapper instead of the closure inside it.
         let body = body;
         (body.0)()
     })
@@ -107,7 +107,7 @@ fn caught<T>(body: impl FnOnce() -> T) -> Result<T, Failure> {
 }
 
 thread_local! {
-    /// How many guards this thread is inside of: a callback may call the library again.
+    /// Number of guards around the current code on this thread: a callback may call the library again.
     static DEPTH: Cell<u32> = const { Cell::new(0) };
 }
 
@@ -126,16 +126,16 @@ impl Drop for Inside {
     }
 }
 
-/// Whether a panic on this thread will reach a guard: it is inside one, or works for a thread that is.
+/// Whether a panic on this thread will reach a guard: the thread is inside one, or is a worker of one that is.
 fn is_ours() -> bool {
     DEPTH.get() > 0 || std::thread::current().name().is_some_and(|name| name.starts_with(THREAD_NAME))
 }
 
-/// Places of panics on their way to a guard, message first. A panic on a worker thread is carried to the caller's
-/// thread with its message but without its place.
+/// Places of panics that have not reached their guard yet, message first. A panic on a worker thread is carried to the
+/// caller's thread with its message but without its place.
 static PLACES: Mutex<VecDeque<(String, String)>> = Mutex::new(VecDeque::new());
 
-/// More panics at once than this, and the oldest loses its place.
+/// Largest number of remembered places; more panics at once make the oldest lose its place.
 const MAX_PLACES: usize = 64;
 
 fn remember(info: &PanicHookInfo<'_>) {

@@ -58,32 +58,32 @@ const PIXELS: [(i32, &str, PixelFormat); 5] = [
     (vg_format::Gray8 as i32, "GRAY8", PixelFormat::Gray8),
 ];
 
-/// Pixels in the caller's memory, lent for the length of a call.
-struct Lent {
+/// Pixels in the caller's memory, borrowed for the duration of a call.
+struct BorrowedPixels {
     data: *const u8,
     len: usize,
 }
 
-// SAFETY: the caller promised that nobody writes to the pixels during the call.
-unsafe impl Send for Lent {}
-unsafe impl Sync for Lent {}
+// SAFETY: the caller promised that the pixels are not written during the call.
+unsafe impl Send for BorrowedPixels {}
+unsafe impl Sync for BorrowedPixels {}
 
-impl AsRef<[u8]> for Lent {
+impl AsRef<[u8]> for BorrowedPixels {
     fn as_ref(&self) -> &[u8] {
-        // SAFETY: checked by `bytes`; whoever holds this is gone when the call returns.
+        // SAFETY: checked by `bytes`; no reference outlives the call.
         unsafe { std::slice::from_raw_parts(self.data, self.len) }
     }
 }
 
-/// The colours of a picture, and its alpha as a mask where it has one. RGB8 without gaps is not copied: the result
+/// Reads the colours of a picture, and its alpha, if any, as a mask. RGB8 without gaps is not copied, so the result
 /// must not outlive the call.
 pub(super) unsafe fn photograph(argument: &str, image: &vg_image) -> Result<(RgbImage, Option<Mask>)> {
     read::not_null(&format!("{argument}.data"), image.data, "the picture's pixels")?;
-    let format = format_of(argument, image, &PIXELS)?;
+    let format = checked_format(argument, image, &PIXELS)?;
     let (bytes, stride) = unsafe { bytes(argument, image, format.bytes_per_pixel())? };
     let (width, height) = (image.width, image.height);
     if format == PixelFormat::Rgb8 && stride == width as usize * 3 {
-        let lent = Lent { data: bytes.as_ptr(), len: bytes.len() };
+        let lent = BorrowedPixels { data: bytes.as_ptr(), len: bytes.len() };
         return Ok((RgbImage::from_owner(argument, width, height, lent)?, None));
     }
     let picture = RgbImage::from_strided(argument, bytes, width, height, stride, format)?;
@@ -93,7 +93,7 @@ pub(super) unsafe fn photograph(argument: &str, image: &vg_image) -> Result<(Rgb
             for v in 0..height as usize {
                 alpha.extend(bytes[v * stride..][..width as usize * 4].chunks_exact(4).map(|p| p[3]));
             }
-            // As in picture files: alpha that hides nothing says nothing.
+            // As for picture files: alpha that is opaque everywhere is no mask.
             match alpha.iter().all(|&a| a == u8::MAX) {
                 true => None,
                 false => Some(Mask::from_strided(argument, &alpha, width, height, width as usize)?),
@@ -104,23 +104,23 @@ pub(super) unsafe fn photograph(argument: &str, image: &vg_image) -> Result<(Rgb
     Ok((picture, mask))
 }
 
-/// A mask, where there is one.
+/// Reads a mask, if there is one.
 pub(super) unsafe fn mask(argument: &str, image: &vg_image) -> Result<Option<Mask>> {
     if image.data.is_null() {
         return Ok(None);
     }
-    format_of(argument, image, &[(vg_format::Gray8 as i32, "GRAY8", ())])?;
+    checked_format(argument, image, &[(vg_format::Gray8 as i32, "GRAY8", ())])?;
     let (bytes, stride) = unsafe { bytes(argument, image, 1)? };
     Mask::from_strided(argument, bytes, image.width, image.height, stride).map(Some)
 }
 
-/// A depth map, where there is one.
+/// Reads a depth map, if there is one.
 pub(super) unsafe fn depth(argument: &str, image: &vg_image) -> Result<Option<DepthMap>> {
     const FLOAT: usize = size_of::<f32>();
     if image.data.is_null() {
         return Ok(None);
     }
-    format_of(argument, image, &[(vg_format::Depth32f as i32, "DEPTH32F", ())])?;
+    checked_format(argument, image, &[(vg_format::Depth32f as i32, "DEPTH32F", ())])?;
     let (bytes, stride) = unsafe { bytes(argument, image, FLOAT)? };
     let (width, height) = (image.width as usize, image.height as usize);
     let mut depth = Vec::with_capacity(width * height);
@@ -132,7 +132,7 @@ pub(super) unsafe fn depth(argument: &str, image: &vg_image) -> Result<Option<De
     DepthMap::new(image.width, image.height, depth).map(Some)
 }
 
-/// A picture as it looks on white, RGB in [0, 1]. `[height * width]`
+/// Reads a picture and composites it on white, RGB in [0, 1]. `[height * width]`
 pub(super) unsafe fn on_white(argument: &str, image: &vg_image) -> Result<Vec<[f32; 3]>> {
     const WITH_ALPHA: [(i32, &str, [usize; 3]); 2] =
         [(vg_format::Rgba8 as i32, "RGBA8", [0, 1, 2]), (vg_format::Bgra8 as i32, "BGRA8", [2, 1, 0])];
@@ -141,7 +141,7 @@ pub(super) unsafe fn on_white(argument: &str, image: &vg_image) -> Result<Vec<[f
     let over = |rgb: [f32; 3], alpha: f32| rgb.map(|c| alpha * c + (1.0 - alpha));
     let mut pixels = Vec::new();
     if let Some((.., order)) = WITH_ALPHA.into_iter().find(|(n, ..)| *n == image.format) {
-        format_of(argument, image, &WITH_ALPHA)?;
+        checked_format(argument, image, &WITH_ALPHA)?;
         let (bytes, stride) = unsafe { bytes(argument, image, 4)? };
         for v in 0..height {
             let row = bytes[v * stride..][..4 * width].as_chunks::<4>().0;
@@ -152,7 +152,7 @@ pub(super) unsafe fn on_white(argument: &str, image: &vg_image) -> Result<Vec<[f
     }
     if image.format == vg_format::Rgba32f as i32 {
         const CHANNEL: usize = size_of::<f32>();
-        format_of(argument, image, &[(vg_format::Rgba32f as i32, "RGBA32F", ())])?;
+        checked_format(argument, image, &[(vg_format::Rgba32f as i32, "RGBA32F", ())])?;
         let (bytes, stride) = unsafe { bytes(argument, image, 4 * CHANNEL)? };
         for v in 0..height {
             // Read bytewise: rows need not be aligned to floats.
@@ -173,20 +173,20 @@ pub(super) unsafe fn on_white(argument: &str, image: &vg_image) -> Result<Vec<[f
     Ok(picture.pixels().iter().map(|p| p.map(|c| f32::from(c) / 255.0)).collect())
 }
 
-/// The picture's format, one of these, and nothing in it that a later version may have a meaning for.
-fn format_of<T: Copy>(argument: &str, image: &vg_image, formats: &[(i32, &str, T)]) -> Result<T> {
+/// Checks that the picture has one of these formats and that its reserved fields are zero.
+fn checked_format<T: Copy>(argument: &str, image: &vg_image, formats: &[(i32, &str, T)]) -> Result<T> {
     read::zero(&format!("{argument}.flags"), image.flags == 0)?;
     read::choice(&format!("{argument}.format"), image.format, formats)
 }
 
-/// All bytes from the first to the last pixel, and the stride, after checking that they can be counted.
+/// The bytes from the first to the last pixel, and the stride, after checking that their number does not overflow.
 unsafe fn bytes<'a>(argument: &str, image: &vg_image, pixel: usize) -> Result<(&'a [u8], usize)> {
     let (len, stride) = extent(argument, ".row_stride", image.width, image.height, image.row_stride, pixel)?;
     Ok((unsafe { std::slice::from_raw_parts(image.data.cast(), len) }, stride))
 }
 
-/// Bytes from the first pixel to the end of the last, and the stride, of a picture of such a size. In errors, the
-/// stride is the picture's name and `stride_name` behind it.
+/// Number of bytes from the first pixel to the end of the last, and the stride, of a picture of this size. In errors,
+/// the stride is called by the picture's name followed by `stride_name`.
 pub(super) fn extent(
     argument: &str,
     stride_name: &str,

@@ -1,6 +1,6 @@
 //! How far a model is from photographs and from a scan.
 
-use super::context::{Workshop, in_context, vg_context};
+use super::context::{CallContext, in_context, vg_context};
 use super::gaussians::{self, vg_gaussians};
 use super::guard::guarded;
 use super::image::{self, vg_image};
@@ -9,7 +9,7 @@ use super::options::vg_progress_fn;
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
 use super::view::{self, vg_view};
-use super::watched::{Told, watched};
+use super::watched::{ProgressCallback, watched};
 use std::ffi::c_void;
 use vg::metrics::{self, F_SCORE_M, Lpips, SurfaceErrors, SurfaceOptions, ViewErrors};
 use vg::render::{RenderOptions, Renderer};
@@ -213,7 +213,7 @@ pub unsafe extern "C" fn vg_metrics_pictures(
             read::not_null("a", a, "a picture")?;
             read::not_null("b", b, "a picture")?;
             read::not_null("out", out, "where to put the errors")?;
-            // At any address, as everywhere.
+            // Structs may be at any address, as in all functions.
             let (lent, other) = (a.read_unaligned(), b.read_unaligned());
             let options = read::optional("options", options)?;
             let (lpips, _) = options.read()?;
@@ -223,8 +223,8 @@ pub unsafe extern "C" fn vg_metrics_pictures(
                 let found = format!("{}x{}", other.width, other.height);
                 return Err(Error::argument("b", found, format!("the size of a, {width}x{height}")));
             }
-            let errors = in_context(options.context, |shop| {
-                shop.threads.run(|| {
+            let errors = in_context(options.context, |context| {
+                context.threads.run(|| {
                     Ok(vg_picture_errors {
                         struct_size: size_of::<vg_picture_errors>(),
                         psnr_db: metrics::psnr(&a, &b),
@@ -260,14 +260,14 @@ pub unsafe extern "C" fn vg_metrics_view(
     unsafe {
         guarded(out_error, || {
             let gaussians = gaussians::required("gaussians", gaussians)?;
-            let view = view::view_of("view", &read::required("view", view)?)?;
+            let view = view::read_view("view", &read::required("view", view)?)?;
             view.validate("view")?;
             read::not_null("out", out, "where to put the errors")?;
             let options = read::optional("options", options)?;
             let (lpips, _) = options.read()?;
-            let errors = in_context(options.context, |shop: &Workshop| {
-                watched(shop, "measure", options.progress(), |watch| {
-                    let renderer = shop.renderer.watched(watch);
+            let errors = in_context(options.context, |context: &CallContext| {
+                watched(context, "measure", options.progress(), |watch| {
+                    let renderer = context.renderer.watched(watch);
                     let drawn = renderer.render(gaussians, &view.camera, &RenderOptions::default())?;
                     let errors = ViewErrors::of(&drawn, &view);
                     let lpips = lpips.map_or(Ok(None), |lpips| lpips.of(&drawn, &view))?;
@@ -318,8 +318,8 @@ pub unsafe extern "C" fn vg_metrics_surface(
             let options = read::optional("options", options)?;
             let (_, how) = options.read()?;
             let (points, _) = numbers.as_chunks::<3>();
-            let errors = in_context(options.context, |shop| {
-                watched(shop, "measure", options.progress(), |watch| {
+            let errors = in_context(options.context, |context| {
+                watched(context, "measure", options.progress(), |watch| {
                     SurfaceErrors::watched(gaussians, points, &how, watch)
                 })
             })
@@ -345,12 +345,12 @@ pub unsafe extern "C" fn vg_metrics_surface(
 }
 
 impl vg_metrics_options {
-    /// Whom to tell how far the call is.
-    fn progress(&self) -> Told {
-        Told { callback: self.progress, user: self.progress_user }
+    /// The callback for progress.
+    fn progress(&self) -> ProgressCallback {
+        ProgressCallback { function: self.progress, user: self.progress_user }
     }
 
-    /// The network, and how surfaces are compared.
+    /// Reads the network and the options for comparing surfaces.
     unsafe fn read(&self) -> Result<(Option<Lpips>, SurfaceOptions)> {
         read::zero("options.flags", self.flags == 0)?;
         let how = SurfaceOptions { f_score_m: self.f_score_m, ..SurfaceOptions::default() };

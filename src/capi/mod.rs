@@ -1,17 +1,17 @@
-//! The C face. `include/vg.h` is generated from this folder, doc comments included, and is written for readers of C.
+//! The C interface. `include/vg.h` is generated from this folder; its public doc comments are written for users of C.
 //!
-//! Every function does the same four things: sets its out parameters to NULL, reads what it was given into the
-//! library's own types (`read`), calls the library, and hands the result out. All of it happens behind one panic
-//! guard (`guard`). Algorithms live elsewhere.
+//! Every function has four steps: it sets its out parameters to NULL, reads its arguments into the library's own types
+//! (`read`), calls the library, and writes the result. All steps run behind one panic guard (`guard`). This folder
+//! contains no algorithms.
 //!
 //! Rules that keep old programs running: functions and enumerators are added, never changed or removed; a struct
-//! that may grow begins with its size and grows at its end; enumerations travel as `int32_t`. `tests/abi` holds all
-//! of it to golden files.
+//! that may grow begins with its size and grows at its end; enumerations are passed as `int32_t`. `tests/abi` checks
+//! these rules against golden files.
 
-// The one place where the library dereferences what a caller promised; `docs/ABI.md` says how it is tested.
+// The only place where the library dereferences the caller's pointers; `docs/ABI.md` describes how it is tested.
 #![allow(unsafe_code)]
 #![allow(non_camel_case_types)]
-// What callers must keep to is the same for all functions and stands in the header's first chapter.
+// The safety requirements are the same for all functions and are in the first chapter of the header.
 #![allow(clippy::missing_safety_doc)]
 
 mod guard;

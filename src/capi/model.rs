@@ -109,8 +109,8 @@ impl vg_model_options {
     }
 }
 
-/// What a field of options lends to a call; NULL is none. The clone shares the open model, so that nothing the call
-/// leaves behind on another thread can outlive it.
+/// The model in a field of options; `None` for NULL. The clone shares the open model, which therefore outlives
+/// everything that the call leaves behind on other threads.
 pub(super) unsafe fn lent(model: *const vg_model) -> Option<Model> {
     unsafe { model.cast::<Model>().as_ref() }.cloned()
 }

@@ -299,7 +299,7 @@ impl vg_options {
         })
     }
 
-    /// Where the vehicle's box stands, by C's names in the error.
+    /// Reads the pose of the vehicle's box; errors use the names of the fields in C.
     fn vehicle_place(&self) -> Result<Option<Place>> {
         let placed = read::flag("options.has_vehicle_place", self.has_vehicle_place)?;
         let place = placed.then_some(Place { center: self.vehicle_center, yaw: self.vehicle_yaw });
@@ -324,7 +324,7 @@ impl vg_options {
             (0, seconds) => Amount::Seconds(seconds),
             (steps, seconds) => {
                 let found = format!("{seconds}, with refine_iterations {steps}");
-                return Err(Error::argument("options.refine_seconds", found, "one of both"));
+                return Err(Error::argument("options.refine_seconds", found, "only one of the two"));
             }
         };
         let options = RefineOptions { amount, hold_out, backend, ..RefineOptions::default() };
@@ -336,7 +336,7 @@ impl vg_options {
         Ok(Some(options))
     }
 
-    /// A copy of the measured points.
+    /// Copies the measured points.
     pub(super) unsafe fn to_cloud(self) -> Result<Option<Cloud>> {
         if self.cloud_count > MAX_CLOUD_POINTS {
             let allowed = format!("0 to {MAX_CLOUD_POINTS}");
@@ -372,7 +372,7 @@ fn keep(bits: u32) -> Result<Keep> {
     })
 }
 
-/// The caller's log, or nobody.
+/// The caller's log callback, if any.
 #[derive(Clone, Copy)]
 pub(super) struct Log {
     pub(super) callback: vg_log_fn,

@@ -1,11 +1,11 @@
-//! Memory that one call writes to more than one end: no byte may be both.
+//! Checks that the output arrays of a call do not overlap.
 
 use vg::{Error, Result};
 
-/// Memory of the caller's that a call writes: rows of the same length, the same distance apart.
+/// Memory of the caller that a call writes: rows of equal length at equal distances.
 #[derive(Clone, Debug)]
 pub(super) struct Written {
-    /// What errors call it.
+    /// Name in errors.
     pub(super) argument: String,
     /// Address of the first byte.
     pub(super) first: usize,
@@ -13,7 +13,7 @@ pub(super) struct Written {
     pub(super) row: usize,
     /// Bytes from row to row.
     pub(super) stride: usize,
-    /// How many; none where nothing is written.
+    /// Number of rows; 0 if nothing is written.
     pub(super) rows: usize,
 }
 
@@ -30,7 +30,7 @@ impl Written {
         self.first + (self.rows - 1) * self.stride + self.row
     }
 
-    /// Whether a byte is in both. Rows of one may lie in the gaps of the other.
+    /// Whether the two have a byte in common. Rows of one may lie in the gaps of the other.
     fn shares_a_byte_with(&self, other: &Self) -> bool {
         let (mut i, mut k) = (0, 0);
         while i < self.rows && k < other.rows {
@@ -46,7 +46,7 @@ impl Written {
 }
 
 /// # Errors
-/// [`Error::Argument`] about the one of two that comes later in the list.
+/// [`Error::Argument`] if two overlap, naming the one that comes later in the list.
 pub(super) fn refuse(written: &[Written]) -> Result<()> {
     let mut order: Vec<usize> = (0..written.len()).filter(|&i| written[i].rows > 0).collect();
     order.sort_unstable_by_key(|&i| written[i].first);
@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_in_the_gaps_of_others_are_fine_and_one_shared_byte_is_not() {
+    fn rows_in_the_gaps_of_others_are_accepted_and_one_shared_byte_is_not() {
         let color = rows("color", 1000, 30, 40, 5);
         let message = |other: Written| refuse(&[color.clone(), other]).err().map(|e| e.to_string());
         let words = "depth: shares memory with color; allowed: memory of its own";
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn tiles_of_one_sheet_share_nothing() {
+    fn tiles_of_one_sheet_do_not_overlap() {
         let tile = |i: usize| rows(&format!("targets[{i}]"), 16 * i, 16, 160, 12);
         let mut sheet: Vec<Written> = (0..10).map(tile).collect();
         refuse(&sheet).unwrap();

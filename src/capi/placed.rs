@@ -98,7 +98,7 @@ pub unsafe extern "C" fn vg_cameras_turntable(
             read::not_null("out", out, "where to put the cameras")?;
             let bounds = gaussians::required("gaussians", gaussians)?.bounds();
             let (low, high) =
-                bounds.ok_or_else(|| Error::argument("gaussians", "none", "at least one to walk around"))?;
+                bounds.ok_or_else(|| Error::argument("gaussians", "no Gaussians", "at least one"))?;
             let cameras = Turntable { elevation_degrees, fov_y_degrees }
                 .cameras(low, high, count, width, height)
                 .map_err(|e| read::renamed(e, &[("bounds", "gaussians")]))?;
@@ -170,7 +170,7 @@ pub unsafe extern "C" fn vg_camera_unproject(
                 return Err(Error::argument("depth_m", depth_m.to_string(), "above 0, finite"));
             }
             let point = camera.vehicle_from_pixel(pixel, depth_m).ok_or_else(|| {
-                Error::argument("pixel", format!("{pixel:?}"), "a pixel that the lens has a ray to")
+                Error::argument("pixel", format!("{pixel:?}"), "a pixel for which the lens defines a ray")
             })?;
             out_point.cast::<[f64; 3]>().write_unaligned(point.to_array());
             Ok(())

@@ -1,4 +1,4 @@
-//! Reading what callers hand in: structs that say their size, strings, arrays; and writing structs back.
+//! Reads arguments (structs that begin with their size, strings, arrays), and writes structs back.
 
 use std::ffi::{CStr, c_char};
 use std::path::Path;
@@ -12,18 +12,18 @@ pub(super) unsafe trait Versioned: Copy {
     /// Its name in C.
     const NAME: &'static str;
 
-    /// `sizeof` in the release that introduced it: no caller has a shorter one.
+    /// `sizeof` in the release that introduced the struct; no caller has a shorter one.
     const FIRST_SIZE: usize;
 
-    /// What its `_init` function leaves.
+    /// Initial values, as set by the struct's `_init` function.
     fn initial() -> Self;
 }
 
-/// No struct will ever be this long; more is a `struct_size` that was not set.
+/// Upper limit on the size of any struct; a larger `struct_size` was not initialized.
 const MAX_SIZE: usize = 4096;
 
-/// A caller's struct of this library's length. What an older caller's lacks has its initial value; what a newer
-/// caller's has beyond must be zero, because it asks for what this library cannot do.
+/// Reads a caller's struct. Fields that an older caller's struct lacks have their initial values; fields that a newer
+/// caller's struct has in addition must be zero, because this library does not have their functions.
 pub(super) unsafe fn required<T: Versioned>(argument: &str, pointer: *const T) -> Result<T> {
     if pointer.is_null() {
         return Err(Error::argument(argument, "NULL", format!("a {}", T::NAME)));
@@ -32,12 +32,12 @@ pub(super) unsafe fn required<T: Versioned>(argument: &str, pointer: *const T) -
     unsafe { sized(argument, pointer, size) }
 }
 
-/// The same where NULL means the initial values.
+/// Reads a caller's struct as [`required`] does; NULL means the initial values.
 pub(super) unsafe fn optional<T: Versioned>(argument: &str, pointer: *const T) -> Result<T> {
     if pointer.is_null() { Ok(T::initial()) } else { unsafe { required(argument, pointer) } }
 }
 
-/// An array whose elements are as far apart as the caller's struct is long.
+/// Reads an array whose elements have the size of the caller's struct.
 pub(super) unsafe fn array<T: Versioned>(argument: &str, first: *const T, count: usize) -> Result<Vec<T>> {
     if first.is_null() {
         return Err(Error::argument(argument, "NULL", format!("an array of {}", T::NAME)));
@@ -61,8 +61,8 @@ pub(super) unsafe fn array<T: Versioned>(argument: &str, first: *const T, count:
     Ok(elements)
 }
 
-/// Fills a caller's struct of any accepted length; its `struct_size` stays, what this library does not know of is
-/// set to zero.
+/// Fills a caller's struct of any accepted length. Its `struct_size` is kept; fields that this library does not know
+/// are set to zero.
 pub(super) unsafe fn fill<T: Versioned>(argument: &str, target: *mut T, value: &T) -> Result<()> {
     if target.is_null() {
         return Err(Error::argument(argument, "NULL", format!("a {}", T::NAME)));
@@ -72,13 +72,13 @@ pub(super) unsafe fn fill<T: Versioned>(argument: &str, target: *mut T, value: &
     Ok(())
 }
 
-/// Whether [`fill`] will take a caller's struct: to be known before the work that fills it.
+/// Checks before the work that [`fill`] will accept a caller's struct.
 pub(super) unsafe fn fillable<T: Versioned>(argument: &str, target: *const T) -> Result<()> {
     not_null(argument, target, T::NAME)?;
     unsafe { struct_size(argument, target).map(|_| ()) }
 }
 
-/// What every `_init` function does; `size` is the caller's `sizeof`.
+/// Implements every `_init` function; `size` is the caller's `sizeof`.
 pub(super) unsafe fn initialize<T: Versioned>(argument: &str, target: *mut T, size: usize) -> Result<()> {
     if target.is_null() {
         return Err(Error::argument(argument, "NULL", format!("a {}", T::NAME)));
@@ -108,16 +108,16 @@ fn check_size<T: Versioned>(argument: &str, size: usize) -> Result<()> {
 unsafe fn sized<T: Versioned>(argument: &str, pointer: *const T, size: usize) -> Result<T> {
     let known = size.min(size_of::<T>());
     let mut value = T::initial();
-    // Bytewise, so that no alignment is asked of the caller.
+    // Copies bytes, so that the caller's struct need not be aligned.
     unsafe {
         std::ptr::copy_nonoverlapping(pointer.cast::<u8>(), (&raw mut value).cast::<u8>(), known);
         (&raw mut value).cast::<usize>().write(size_of::<T>());
     }
     let beyond = unsafe { std::slice::from_raw_parts(pointer.cast::<u8>().add(known), size - known) };
     if beyond.iter().any(|&byte| byte != 0) {
-        let found = format!("{size} bytes, and not all of those after the first {known} are zero");
+        let found = format!("{size} bytes, some of which after the first {known} are not zero");
         let allowed = format!(
-            "what version {} of the library knows: {known} bytes, zero beyond",
+            "only zeros after the {known} bytes that version {} of the library knows",
             env!("CARGO_PKG_VERSION")
         );
         return Err(Error::argument(argument, found, allowed));
@@ -135,7 +135,7 @@ unsafe fn write_sized<T: Versioned>(target: *mut T, value: &T, size: usize) {
     }
 }
 
-/// A handle or out parameter that must be there.
+/// Checks that a handle or out parameter is not NULL.
 pub(super) fn not_null<T>(argument: &str, pointer: *const T, what: &str) -> Result<()> {
     if pointer.is_null() {
         return Err(Error::argument(argument, "NULL", what));
@@ -143,7 +143,7 @@ pub(super) fn not_null<T>(argument: &str, pointer: *const T, what: &str) -> Resu
     Ok(())
 }
 
-/// A reference to what a handle points to.
+/// A reference to the object that a handle points to.
 pub(super) unsafe fn handle<'a, T>(argument: &str, pointer: *const T, what: &str) -> Result<&'a T> {
     unsafe { pointer.as_ref() }.ok_or_else(|| Error::argument(argument, "NULL", what))
 }
@@ -179,7 +179,7 @@ pub(super) unsafe fn path<'a>(argument: &str, pointer: *const c_char) -> Result<
     }
 }
 
-/// `count` numbers the caller points to; an empty slice whatever the pointer is where `count` is 0.
+/// `count` numbers of the caller; if `count` is 0, an empty slice for any pointer.
 pub(super) unsafe fn numbers<'a, T>(argument: &str, pointer: *const T, count: usize) -> Result<&'a [T]> {
     if count == 0 {
         // `std::vector::data()` of an empty vector may be NULL.
@@ -193,7 +193,7 @@ pub(super) unsafe fn numbers<'a, T>(argument: &str, pointer: *const T, count: us
         return Err(Error::argument(argument, format!("address {pointer:p}"), allowed));
     }
     if count.checked_mul(size_of::<T>()).is_none_or(|bytes| bytes > isize::MAX as usize) {
-        return Err(Error::argument(argument, format!("{count} numbers"), "what fits into memory"));
+        return Err(Error::argument(argument, format!("{count} numbers"), "as many as fit into memory"));
     }
     Ok(unsafe { std::slice::from_raw_parts(pointer, count) })
 }
@@ -206,17 +206,17 @@ pub(super) unsafe fn fixed<const N: usize>(argument: &str, pointer: *const f64) 
     Ok(unsafe { pointer.cast::<[f64; N]>().read_unaligned() })
 }
 
-/// Where `count` numbers go; they may be nowhere where `count` is 0.
+/// Checks an output array of `count` numbers, which may be NULL if `count` is 0.
 pub(super) fn writable<T>(argument: &str, pointer: *const T, count: usize) -> Result<()> {
     if count == 0 { Ok(()) } else { not_null(argument, pointer, &format!("{count} elements")) }
 }
 
-/// The address of numbers that are lent to the caller; NULL where there are none.
+/// The address of numbers that the caller borrows; NULL if there are none.
 pub(super) fn address<T, U>(values: &[T]) -> *const U {
     if values.is_empty() { std::ptr::null() } else { values.as_ptr().cast() }
 }
 
-/// A number of an enumeration, checked.
+/// The value of an enumerator's number, checked.
 pub(super) fn choice<T: Copy>(argument: &str, number: i32, choices: &[(i32, &str, T)]) -> Result<T> {
     choices.iter().find(|(n, ..)| *n == number).map(|(.., value)| *value).ok_or_else(|| {
         let names: Vec<String> = choices.iter().map(|(n, name, _)| format!("{n} ({name})")).collect();
@@ -224,12 +224,12 @@ pub(super) fn choice<T: Copy>(argument: &str, number: i32, choices: &[(i32, &str
     })
 }
 
-/// A yes or no that travels as a number.
+/// A boolean that is passed as a number.
 pub(super) fn flag(argument: &str, number: i32) -> Result<bool> {
     choice(argument, number, &[(0, "no", false), (1, "yes", true)])
 }
 
-/// The error of a function that calls its argument or field `from`, for callers who know it as `to`.
+/// Renames the argument or field of an error from the library's name, `from`, to C's name, `to`.
 pub(super) fn renamed(error: Error, names: &[(&str, &str)]) -> Error {
     let Error::Argument { argument, found, allowed } = error else { return error };
     let known = names.iter().find_map(|(from, to)| {
@@ -239,7 +239,7 @@ pub(super) fn renamed(error: Error, names: &[(&str, &str)]) -> Error {
     Error::Argument { argument: known.unwrap_or(argument), found, allowed }
 }
 
-/// A field kept for later.
+/// Checks that a reserved field is zero.
 pub(super) fn zero(argument: &str, is_zero: bool) -> Result<()> {
     if is_zero { Ok(()) } else { Err(Error::argument(argument, "not zero", "zero: reserved")) }
 }

@@ -1,6 +1,6 @@
-//! The main job.
+//! Reconstruction.
 
-use super::context::{Workshop, in_context};
+use super::context::{CallContext, in_context};
 use super::gaussians::{self, vg_gaussians};
 use super::guard::{clear, guarded};
 use super::options::{Log, vg_log_level, vg_options};
@@ -8,7 +8,7 @@ use super::read;
 use super::report::{ReportObject, vg_report};
 use super::status::{vg_error, vg_status};
 use super::view::{self, vg_view};
-use super::watched::Told;
+use super::watched::ProgressCallback;
 use vg::Result;
 use vg::pipeline::{self, Reconstruction, Report};
 use vg::progress::Progress;
@@ -41,8 +41,8 @@ pub unsafe extern "C" fn vg_reconstruct(
             let settings = options.to_options()?;
             let mut scene = view::scene(views, view_count)?;
             scene.cloud = options.to_cloud()?;
-            let made = in_context(options.context, |shop| run(shop, &scene, &settings, &options))?;
-            // Nothing can fail any more once the first handle is out.
+            let made = in_context(options.context, |context| run(context, &scene, &settings, &options))?;
+            // From the first handle that is written on, nothing can fail.
             let report = (!out_report.is_null()).then(|| ReportObject::new(made.report, made.points));
             out_gaussians.write(gaussians::into_raw(made.gaussians));
             if let Some(report) = report {
@@ -54,20 +54,20 @@ pub unsafe extern "C" fn vg_reconstruct(
 }
 
 unsafe fn run(
-    shop: &Workshop,
+    context: &CallContext,
     scene: &Scene,
     settings: &pipeline::Options,
     options: &vg_options,
 ) -> Result<Reconstruction> {
-    let told = Told { callback: options.progress, user: options.progress_user };
+    let callback = ProgressCallback { function: options.progress, user: options.progress_user };
     let mut progress = |at: Progress| {
         if !options.progress_overall.is_null() {
             unsafe { options.progress_overall.write_unaligned(at.overall) };
         }
-        unsafe { told.tell(at) }
+        unsafe { callback.report(at) }
     };
-    let mut made = pipeline::reconstruct_on(&shop.threads, scene, settings, &mut progress)?;
-    made.report.settings.threads = shop.threads.count();
+    let mut made = pipeline::reconstruct_on(&context.threads, scene, settings, &mut progress)?;
+    made.report.settings.threads = context.threads.count();
     unsafe { log(Log { callback: options.log, user: options.log_user }, &made.report) };
     Ok(made)
 }
@@ -77,8 +77,8 @@ unsafe fn log(log: Log, report: &Report) {
         for reason in &report.verdict_reasons {
             log.line(vg_log_level::Warning, || reason.to_string());
         }
-        let of_network = report.network.iter().flat_map(|network| &network.warnings);
-        for warning in report.warnings.iter().chain(of_network) {
+        let network_warnings = report.network.iter().flat_map(|network| &network.warnings);
+        for warning in report.warnings.iter().chain(network_warnings) {
             log.line(vg_log_level::Warning, || warning.clone());
         }
         for left in &report.left_out {

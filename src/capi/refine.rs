@@ -1,4 +1,4 @@
-//! Refinement of Gaussians that are there already.
+//! Refinement of existing Gaussians.
 
 use super::context::{in_context, vg_context};
 use super::gaussians::{self, vg_gaussians};
@@ -8,7 +8,7 @@ use super::read::{self, Versioned};
 use super::render::{backend, vg_backend};
 use super::status::{vg_error, vg_status};
 use super::view::{self, vg_view};
-use super::watched::Told;
+use super::watched::ProgressCallback;
 use std::ffi::c_void;
 use vg::Result;
 use vg::refine::{self, Amount, Densify, RefineOptions, Refinement, Stop};
@@ -207,10 +207,10 @@ pub unsafe extern "C" fn vg_refine(
             if !out_refinement.is_null() {
                 read::fillable("out_refinement", out_refinement)?;
             }
-            let told = Told { callback: options.progress, user: options.progress_user };
-            let mut progress = |at| told.tell(at);
-            let (refined, done) = in_context(options.context, |shop| {
-                refine::model_on(&shop.threads, gaussians, &scene, &settings, &mut progress)
+            let callback = ProgressCallback { function: options.progress, user: options.progress_user };
+            let mut progress = |at| callback.report(at);
+            let (refined, done) = in_context(options.context, |context| {
+                refine::model_on(&context.threads, gaussians, &scene, &settings, &mut progress)
             })?;
             if !out_refinement.is_null() {
                 read::fill("out_refinement", out_refinement, &(&done).into())?;

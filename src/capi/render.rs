@@ -1,4 +1,4 @@
-//! Pictures of Gaussians.
+//! Rendering of Gaussians.
 
 use super::camera::{self, vg_camera};
 use super::context::{in_context, vg_context};
@@ -9,7 +9,7 @@ use super::options::{sh_degree, vg_progress_fn};
 use super::overlap::{self, Written};
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
-use super::watched::{Told, watched};
+use super::watched::{ProgressCallback, watched};
 use std::ffi::c_void;
 use vg::render::backend::{Trainer, is_built, not_built, trainer};
 use vg::render::{Backend, Background, DepthMode, RenderOptions, Rendered};
@@ -214,12 +214,12 @@ pub unsafe extern "C" fn vg_render(
             let (settings, alpha) = options.read()?;
             let target = read::required("target", target)?;
             let target = Target::read("target", &target, &settings, alpha, camera.width, camera.height)?;
-            in_context(options.context, |shop| {
-                shop.pictures.lend(|picture| {
+            in_context(options.context, |context| {
+                context.pictures.lend(|picture| {
                     match device(&options)? {
                         Some(device) => *picture = device.render(gaussians, &camera, &settings)?,
-                        None => watched(shop, "render", options.progress(), |watch| {
-                            let renderer = shop.renderer.watched(watch);
+                        None => watched(context, "render", options.progress(), |watch| {
+                            let renderer = context.renderer.watched(watch);
                             renderer.render_into(gaussians, &camera, &settings, picture).map(drop)
                         })?,
                     }
@@ -231,7 +231,7 @@ pub unsafe extern "C" fn vg_render(
     }
 }
 
-/// The graphics processor, where a picture is to be drawn there.
+/// The GPU renderer, if the options choose it.
 pub(super) fn device(options: &vg_render_options) -> Result<Option<Trainer>> {
     match options.backend == vg_backend::Gpu as i32 {
         true => Ok(Some(trainer(Backend::Gpu)?.0)),
@@ -239,7 +239,7 @@ pub(super) fn device(options: &vg_render_options) -> Result<Option<Trainer>> {
     }
 }
 
-/// Who is asked to draw, if this build can.
+/// The chosen renderer; an error if this build lacks it.
 pub(super) fn backend(argument: &str, number: i32) -> Result<Backend> {
     let backends = [
         (vg_backend::Auto as i32, "auto", Backend::Auto),
@@ -253,9 +253,9 @@ pub(super) fn backend(argument: &str, number: i32) -> Result<Backend> {
 }
 
 impl vg_render_options {
-    /// Whom to tell how far the call is.
-    pub(super) fn progress(&self) -> Told {
-        Told { callback: self.progress, user: self.progress_user }
+    /// The callback for progress.
+    pub(super) fn progress(&self) -> ProgressCallback {
+        ProgressCallback { function: self.progress, user: self.progress_user }
     }
 
     pub(super) fn read(&self) -> Result<(RenderOptions, vg_alpha)> {
@@ -293,7 +293,7 @@ impl vg_render_options {
     }
 }
 
-/// The caller's memory, checked.
+/// The caller's memory for a picture, checked.
 pub(super) struct Target {
     width: u32,
     height: u32,
@@ -306,11 +306,11 @@ pub(super) struct Target {
 unsafe impl Send for Target {}
 unsafe impl Sync for Target {}
 
-/// How a pixel is written.
+/// Layout of a pixel.
 #[derive(Clone, Copy)]
 struct Pixel {
     layout: Layout,
-    /// The picture's own alpha, or 1.
+    /// Whether alpha is 1 instead of the picture's own alpha.
     opaque: bool,
     alpha: vg_alpha,
 }
@@ -335,7 +335,7 @@ impl Layout {
 }
 
 impl Target {
-    /// `argument` is what errors call the target.
+    /// Reads and checks a target; `argument` names it in errors.
     pub(super) fn read(
         argument: &str,
         target: &vg_image_target,
@@ -386,7 +386,7 @@ impl Target {
         Ok(target)
     }
 
-    /// What is written of it.
+    /// The memory that is written.
     pub(super) fn written(&self, argument: &str) -> Vec<Written> {
         let plane = |name: &str, first: *mut u8, stride: usize, bytes: usize| Written {
             argument: format!("{argument}.{name}"),
@@ -403,13 +403,13 @@ impl Target {
         [color, depth, alpha].into_iter().flatten().collect()
     }
 
-    /// Whether bytes are all that is wanted, and [`Rgba8`](vg::render::Rgba8) has them.
+    /// Whether [`Rgba8`](vg::render::Rgba8) contains all that the target asks for.
     pub(super) fn takes_bytes(&self) -> bool {
         let Self { color: Some((_, _, pixel)), depth: None, alpha: None, .. } = self else { return false };
         pixel.layout != Layout::Rgba32f && (pixel.opaque || pixel.alpha == vg_alpha::Straight)
     }
 
-    /// As [`Target::write`], of a picture of bytes, `width` to a row.
+    /// As [`Target::write`], for a picture of bytes with `width` pixels to a row.
     pub(super) unsafe fn write_bytes(&self, rgba: &[[u8; 4]], width: u32) {
         let Some((first, stride, pixel)) = self.color else { return };
         let size = pixel.layout.bytes();
@@ -424,7 +424,7 @@ impl Target {
         }
     }
 
-    /// Copies the picture row by row, through slices of one row each: the gaps are not ours.
+    /// Copies the picture row by row, because the gaps between rows belong to the caller.
     pub(super) unsafe fn write(&self, picture: &Rendered) {
         let width = picture.width as usize;
         for v in 0..picture.height as usize {
@@ -455,7 +455,7 @@ fn layout(argument: &str, format: i32, opaque: bool) -> Result<Layout> {
         (vg_format::Rgb8 as i32, "RGB8", Layout::Rgb8),
         (vg_format::Bgr8 as i32, "BGR8", Layout::Bgr8),
     ];
-    // Without alpha there is no way to say that nothing is there.
+    // A format without alpha cannot store transparency.
     read::choice(argument, format, if opaque { &all } else { &all[..3] })
 }
 

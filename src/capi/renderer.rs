@@ -1,4 +1,4 @@
-//! Gaussians made ready to be drawn many times, by the CPU or a graphics processor.
+//! Gaussians prepared for rendering many times, on the CPU or a GPU.
 
 use super::camera::{self, vg_camera};
 use super::context::{in_context, vg_context};
@@ -51,14 +51,14 @@ unsafe impl Versioned for vg_renderer_options {
     }
 }
 
-/// What a `vg_renderer` points to.
+/// Type that a `vg_renderer` points to.
 struct RendererObject {
     ready: AssetRenderer,
-    /// Each text that was lent out; there are two at most.
+    /// Texts that callers have borrowed, at most two.
     texts: Mutex<Vec<CString>>,
 }
 
-/// Pictures of one call.
+/// Largest number of pictures of one call.
 const MAX_PICTURES: usize = 4096;
 
 /// Sets `*options` to the default values. `size`: `sizeof *options`.
@@ -94,8 +94,9 @@ pub unsafe extern "C" fn vg_renderer_new(
             read::zero("options.flags", options.flags == 0)?;
             let backend = backend("options.backend", options.backend)?;
             read::not_null("out", out, "where to put the renderer")?;
-            let ready =
-                in_context(options.context, |shop| shop.threads.run(|| AssetRenderer::new(shared, backend)))?;
+            let ready = in_context(options.context, |context| {
+                context.threads.run(|| AssetRenderer::new(shared, backend))
+            })?;
             let object = RendererObject { ready, texts: Mutex::default() };
             out.write(Box::into_raw(Box::new(object)).cast());
             Ok(())
@@ -147,17 +148,17 @@ pub unsafe extern "C" fn vg_renderer_render(
                 places.iter().enumerate().flat_map(|(i, place)| place.written(&format!("targets[{i}]")));
             overlap::refuse(&written.collect::<Vec<_>>())?;
             let ready = &object.ready;
-            // Of the CPU's planes the bytes are made on the way to the target.
+            // The CPU's planes are converted to bytes while they are copied to the target.
             let as_bytes = ready.choice().backend == Backend::Gpu && places.iter().all(Target::takes_bytes);
-            in_context(options.context, |shop| {
-                watched(shop, "render", options.progress(), |watch| match as_bytes {
-                    true => shop.bytes.lend(|bytes| {
+            in_context(options.context, |context| {
+                watched(context, "render", options.progress(), |watch| match as_bytes {
+                    true => context.bytes.lend(|bytes| {
                         ready.render_each_watched(&seen, &settings, bytes, watch, |i, rgba: &Rgba8| {
                             places[i].write_bytes(&rgba.pixels, seen[i].width);
                             Ok(())
                         })
                     }),
-                    false => shop.pictures.lend(|picture| {
+                    false => context.pictures.lend(|picture| {
                         ready.render_each_watched(&seen, &settings, picture, watch, |i, planes| {
                             places[i].write(planes);
                             Ok(())
@@ -196,7 +197,7 @@ pub unsafe extern "C" fn vg_renderer_choice(renderer: *const vg_renderer) -> *co
             texts.push(text);
             texts.len() - 1
         });
-        // A CString's bytes stay where they are when the list grows.
+        // The bytes of a CString do not move when the list grows.
         texts[known].as_ptr()
     })
 }

@@ -1,4 +1,4 @@
-//! What a reconstruction did.
+//! Report of a reconstruction.
 
 use super::guard::{free, guarded, guarded_value};
 use super::options::vg_prior;
@@ -14,11 +14,11 @@ pub struct vg_report {
     _private: [u8; 0],
 }
 
-/// What a `vg_report` points to.
+/// Type that a `vg_report` points to.
 pub(super) struct ReportObject {
     report: Report,
     json: CString,
-    /// A line each.
+    /// Reasons of the verdict, one line each.
     reasons: Vec<CString>,
     points: PointCloud,
 }
@@ -28,7 +28,7 @@ impl ReportObject {
         let json = serde_json::to_string_pretty(&report)
             .unwrap_or_else(|e| format!("{{\"error\": {:?}}}", e.to_string()));
         let reasons = report.verdict_reasons.iter().map(|r| c_string(one_line(&r.to_string()))).collect();
-        // The text has their paths; a report that is kept must not keep a network's memory.
+        // The text contains the models' paths; a report must not keep a network's memory alive.
         (report.settings.prior_model, report.settings.head_model) = (None, None);
         Self { report, json: c_string(json), reasons, points: points.unwrap_or_default() }
     }

@@ -1,14 +1,14 @@
 //! Scenes on disk.
 
 use super::camera::vg_camera;
-use super::context::{Workshop, in_context, vg_context};
+use super::context::{CallContext, in_context, vg_context};
 use super::guard::{clear, free, guarded, guarded_value};
 use super::image::{vg_format, vg_image};
 use super::options::{Log, vg_log_fn, vg_log_level, vg_progress_fn};
 use super::read::{self, Versioned};
 use super::status::{c_string, vg_error, vg_status};
 use super::view::vg_view;
-use super::watched::{Told, watched};
+use super::watched::{ProgressCallback, watched};
 use std::ffi::{CString, c_char, c_void};
 use vg::geometry::Similarity;
 use vg::io::{self, SceneFormat, SceneOptions};
@@ -22,7 +22,7 @@ pub struct vg_scene {
     _private: [u8; 0],
 }
 
-/// What a `vg_scene` points to.
+/// Type that a `vg_scene` points to.
 struct SceneObject {
     scene: Scene,
     names: Vec<CString>,
@@ -142,9 +142,9 @@ unsafe fn open(
                 SceneFormat::Transforms => read::optional("options", options)?,
             };
             let wanted = SceneOptions { format: Some(format), ..options.read()? };
-            let told = Told { callback: options.progress, user: options.progress_user };
-            let open = |shop: &Workshop| {
-                watched(shop, "read", told, |watch| io::open_scene_watched(path, &wanted, watch))
+            let callback = ProgressCallback { function: options.progress, user: options.progress_user };
+            let open = |context: &CallContext| {
+                watched(context, "read", callback, |watch| io::open_scene_watched(path, &wanted, watch))
             };
             let files = in_context(options.context, open)
                 .map_err(|e| read::renamed(e, &[("depth_scale", "options.depth_scale")]))?;
@@ -234,7 +234,7 @@ pub unsafe extern "C" fn vg_scene_get_view(
     }
 }
 
-/// A view as C sees it, pointing into ours.
+/// A view for C, which points into the library's view.
 fn lent(view: &View, name: &CString) -> vg_view {
     let (width, height) = (view.image.width(), view.image.height());
     let image = |data: *const c_void, format: vg_format| vg_image {

@@ -1,4 +1,4 @@
-//! Masks from a network, where nobody made any.
+//! Masks from a segmentation network.
 
 use super::camera::{self, vg_camera};
 use super::context::{in_context, vg_context};
@@ -69,7 +69,7 @@ pub unsafe extern "C" fn vg_segment(
     unsafe {
         guarded(out_error, || {
             read::not_null("image", image, "a picture")?;
-            // At any address, as everywhere.
+            // Structs may be at any address, as in all functions.
             let lent = image.read_unaligned();
             let camera = camera::camera("camera", &read::required("camera", camera)?)?;
             let options = read::optional("options", options)?;
@@ -82,8 +82,9 @@ pub unsafe extern "C" fn vg_segment(
                 false => onnx::not_built("model"),
             })?;
             let segmenter = Segmenter::new(model)?;
-            let made =
-                in_context(options.context, |shop| shop.threads.run(|| segmenter.mask(&picture, &camera)))?;
+            let made = in_context(options.context, |context| {
+                context.threads.run(|| segmenter.mask(&picture, &camera))
+            })?;
             write(&made, out_mask, stride);
             Ok(())
         })

@@ -1,4 +1,4 @@
-//! Parts of Gaussians, their covariances, and their PLY files in memory.
+//! Selections of Gaussians, covariances, and PLY files in memory.
 
 use super::gaussians::{make, required, vg_gaussians};
 use super::guard::{guarded, guarded_value};
@@ -105,7 +105,7 @@ pub unsafe extern "C" fn vg_gaussians_covariances(
     }
 }
 
-/// The caller's array has an element for each Gaussian.
+/// Checks that the caller's array has an element for each Gaussian.
 fn as_many(argument: &str, count: usize, gaussians: &Gaussians) -> Result<()> {
     match count == gaussians.len() {
         true => Ok(()),
@@ -161,7 +161,7 @@ pub unsafe extern "C" fn vg_gaussians_save_ply_memory(
             read::not_null("buffer", buffer, "where to put the file")?;
             let needed = ply::size_of(gaussians);
             if size < needed {
-                let allowed = format!("at least {needed}, what vg_gaussians_ply_size says");
+                let allowed = format!("at least {needed}, as vg_gaussians_ply_size returns");
                 return Err(Error::argument("size", format!("{size} bytes"), allowed));
             }
             let bytes = ply::to_bytes(gaussians);

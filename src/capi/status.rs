@@ -1,4 +1,4 @@
-//! What functions return, and the error object that says why.
+//! Status codes of functions, and the error object with the message.
 
 use super::guard::{Failure, free, guarded_value};
 use std::ffi::{CStr, CString, c_char};
@@ -37,14 +37,14 @@ pub struct vg_error {
     _private: [u8; 0],
 }
 
-/// What a `vg_error` points to.
+/// Type that a `vg_error` points to.
 pub(super) struct ErrorObject {
     status: vg_status,
     message: CString,
 }
 
 impl vg_error {
-    // The handle's name is where readers look for what is behind it.
+    // Named after the handle, where readers look for it.
     #[allow(clippy::new_ret_no_self)]
     pub(super) fn new(failure: Failure) -> ErrorObject {
         let (status, message) = match failure {
@@ -71,7 +71,7 @@ impl From<&Error> for vg_status {
     }
 }
 
-/// A message on one line: it may quote a name or a path that has several, and a panic's has.
+/// A message on one line: quoted names and paths, and panic messages, may contain line breaks.
 pub(super) fn one_line(text: &str) -> String {
     let escaped = |c: char| match c.is_control() {
         true => c.escape_default().collect::<String>(),
@@ -102,7 +102,7 @@ impl vg_status {
         Self::Threads,
     ];
 
-    /// Its name in C.
+    /// The status's name in C.
     fn name(self) -> &'static CStr {
         match self {
             Self::Ok => c"VG_STATUS_OK",

@@ -1,4 +1,4 @@
-//! The ABI as two witnesses beside cbindgen see it, and panics in every function.
+//! The ABI according to two sources independent of cbindgen, and panics in every function.
 
 #[path = "../../tests/abi/contents.rs"]
 mod contents;
@@ -22,7 +22,7 @@ fn golden_layout() -> String {
     golden.lines().filter(|line| !line.contains(" = ")).fold(String::new(), |text, line| text + line + "\n")
 }
 
-/// Every struct of the header as rustc lays it out.
+/// Layout of every struct of the header according to rustc.
 fn layout_of_rust() -> String {
     fn size<T, F>(_: fn(&T) -> &F) -> usize {
         size_of::<F>()
@@ -113,7 +113,7 @@ fn rust_sees_the_golden_layout() {
     }
 }
 
-/// What C calls a variant of an enumeration: `VG_KEEP_SH_BANDS` of `vg_keep` and `ShBands`.
+/// C's name of an enumeration's variant: `VG_KEEP_SH_BANDS` for `vg_keep` and `ShBands`.
 fn enumerator(enumeration: &str, variant: &str) -> String {
     let word = |(i, c): (usize, char)| match c.is_ascii_uppercase() && i > 0 {
         true => format!("_{c}"),
@@ -123,7 +123,7 @@ fn enumerator(enumeration: &str, variant: &str) -> String {
     format!("{}_{name}", enumeration.to_ascii_uppercase())
 }
 
-/// Every enumerator with its number, named as C names it.
+/// Every enumerator with its number, by its name in C.
 fn numbers_of_rust() -> BTreeSet<String> {
     let mut lines = BTreeSet::new();
     let mut note = |enumeration: &str, variant: &str, number: i32| {
@@ -178,7 +178,7 @@ fn every_status_is_called_what_the_header_calls_it() {
     assert!(count >= 9, "{count} statuses");
 }
 
-/// Names every struct, so that safer-ffi writes them all into its header.
+/// Uses every struct, so that safer-ffi writes them all into its header.
 #[safer_ffi::ffi_export]
 fn vg_abi_witness(
     _: &vg_camera,
@@ -191,7 +191,7 @@ fn vg_abi_witness(
 ) {
 }
 
-/// The rest: a function of the witness takes few arguments.
+/// Uses the remaining structs, because a safer-ffi function takes few arguments.
 #[safer_ffi::ffi_export]
 fn vg_abi_witness_more(
     _: &vg_image_gradient,
@@ -204,7 +204,7 @@ fn vg_abi_witness_more(
 ) {
 }
 
-/// Those of the metrics.
+/// Uses the structs of the metrics.
 #[safer_ffi::ffi_export]
 fn vg_abi_witness_metrics(
     _: &vg_metrics_options,
@@ -214,16 +214,16 @@ fn vg_abi_witness_metrics(
 ) {
 }
 
-/// Those of the refinement.
+/// Uses the structs of the refinement.
 #[safer_ffi::ffi_export]
 fn vg_abi_witness_refine(_: &vg_refine_options, _: &vg_refinement) {}
 
-/// Those of the alignment.
+/// Uses the structs of the alignment.
 #[safer_ffi::ffi_export]
 fn vg_abi_witness_align(_: &vg_align_options, _: &vg_alignment) {}
 
 /// safer-ffi derives each struct's C form from the compiled type, by traits that only FFI-safe types have; cbindgen
-/// reads the source text. Neither knows of the other.
+/// reads the source text. The two are independent.
 #[test]
 fn a_second_generator_writes_a_header_of_the_golden_layout() {
     if !cfg!(target_arch = "x86_64") || !tools::have(&tools::cc(), "gcc", "the second header") {
@@ -236,10 +236,10 @@ fn a_second_generator_writes_a_header_of_the_golden_layout() {
     assert_eq!(contents.printed_by(&tools::cc(), "c11", &header), golden_layout());
 }
 
-/// Calls a function, with somewhere to put the error.
+/// Calls a function with a pointer for its error.
 type Call = Box<dyn Fn(*mut *mut vg_error) -> Outcome>;
 
-/// Each function with arguments that do not matter: the panic comes first. Status functions get an error object.
+/// Each function with arbitrary arguments, because the panic comes first. Status functions get an error pointer.
 fn every_function() -> Vec<(&'static str, Call)> {
     macro_rules! functions {
         ($($name:ident ( $($argument:expr),* ) $kind:ident;)*) => { vec![$((
@@ -367,11 +367,11 @@ fn every_function() -> Vec<(&'static str, Call)> {
     }
 }
 
-/// What a function returned.
+/// Result of a function.
 enum Outcome {
-    /// And what it said.
+    /// A status with an error object.
     Status(vg_status),
-    /// It has no error object.
+    /// A status without an error object.
     Silent(vg_status),
     Value(usize),
     Text(&'static CStr),
@@ -403,7 +403,7 @@ fn no_function_is_missing_from_that_list() {
     let header = std::fs::read_to_string(vg_testing::root().join("include/vg.h")).unwrap();
     let declared = contents::functions(&header);
     let mut listed: BTreeSet<String> = every_function().iter().map(|(name, _)| (*name).to_owned()).collect();
-    // Constants: nothing in them can panic.
+    // These return constants and cannot panic.
     listed.extend(["vg_version", "vg_abi_version"].map(str::to_owned));
     assert_eq!(listed, declared);
 }
@@ -435,7 +435,7 @@ fn a_panic_without_words_still_has_a_message() {
     assert!(message.contains("panic without a message"), "{message}");
 }
 
-/// Run by the next test in a process of its own.
+/// Run by the next test in a separate process.
 #[test]
 #[ignore = "prints nothing, which only another process can see"]
 fn panics_quietly() {
@@ -462,7 +462,7 @@ fn panics_elsewhere_still_reach_the_hosts_hook() {
     assert!(!output.status.success() && err.contains("the host's own"), "{err}");
 }
 
-/// Run by the test before in a process of its own.
+/// Run by the previous test in a separate process.
 #[test]
 #[ignore = "panics, in a process of its own"]
 fn panics_outside_the_guard() {

@@ -55,18 +55,18 @@ pub unsafe extern "C" fn vg_view_init(view: *mut vg_view, size: usize) -> vg_sta
     unsafe { guarded(std::ptr::null_mut(), || read::initialize("view", view, size)) }
 }
 
-/// The caller's views; the scene must not outlive the call, because it borrows their pixels.
+/// Reads the caller's views; the scene borrows their pixels and must not outlive the call.
 pub(super) unsafe fn scene(views: *const vg_view, count: usize) -> Result<Scene> {
     if !(1..=MAX_VIEWS).contains(&count) {
         return Err(Error::argument("view_count", count.to_string(), format!("1 to {MAX_VIEWS}")));
     }
     let views = unsafe { read::array("views", views, count)? };
-    let view = |(i, view): (usize, &vg_view)| unsafe { view_of(&format!("views[{i}]"), view) };
+    let view = |(i, view): (usize, &vg_view)| unsafe { read_view(&format!("views[{i}]"), view) };
     Ok(Scene { views: views.iter().enumerate().map(view).collect::<Result<_>>()?, ..Scene::default() })
 }
 
-/// One of them.
-pub(super) unsafe fn view_of(argument: &str, view: &vg_view) -> Result<View> {
+/// Reads one view.
+pub(super) unsafe fn read_view(argument: &str, view: &vg_view) -> Result<View> {
     let part = |name: &str| format!("{argument}.{name}");
     unsafe {
         let name = read::text(&part("name"), view.name)?.to_owned();

@@ -1,6 +1,6 @@
-//! Work that the caller is told of, and can end, where its options name a callback.
+//! Work that reports its progress to the caller's callback, which can cancel it.
 
-use super::context::Workshop;
+use super::context::CallContext;
 use super::options::vg_progress_fn;
 use super::status::c_string;
 use std::ffi::c_void;
@@ -8,34 +8,36 @@ use std::ops::ControlFlow;
 use vg::Result;
 use vg::progress::{Progress, UNWATCHED, Watch};
 
-/// The caller's callback.
+/// The caller's progress callback and its user pointer.
 #[derive(Clone, Copy)]
-pub(super) struct Told {
-    pub(super) callback: vg_progress_fn,
+pub(super) struct ProgressCallback {
+    pub(super) function: vg_progress_fn,
     pub(super) user: *mut c_void,
 }
 
-impl Told {
-    /// Tells the caller where the call stands, and hears whether to go on.
-    pub(super) unsafe fn tell(self, progress: Progress) -> ControlFlow<()> {
-        let Some(callback) = self.callback else { return ControlFlow::Continue(()) };
+impl ProgressCallback {
+    /// Reports progress to the caller; returns whether to continue.
+    pub(super) unsafe fn report(self, progress: Progress) -> ControlFlow<()> {
+        let Some(function) = self.function else { return ControlFlow::Continue(()) };
         let stage = c_string(progress.stage.to_owned());
-        match unsafe { callback(stage.as_ptr(), progress.fraction, self.user) } {
+        match unsafe { function(stage.as_ptr(), progress.fraction, self.user) } {
             0 => ControlFlow::Continue(()),
             _ => ControlFlow::Break(()),
         }
     }
 }
 
-/// Runs `work` on the workshop's threads, and tells of it on this one.
+/// Runs `work` on the context's threads and reports its progress on the calling thread.
 pub(super) unsafe fn watched<T: Send>(
-    shop: &Workshop,
+    context: &CallContext,
     stage: &'static str,
-    told: Told,
+    callback: ProgressCallback,
     work: impl FnOnce(&Watch) -> Result<T> + Send,
 ) -> Result<T> {
-    match told.callback {
-        None => shop.threads.run(|| work(&UNWATCHED)),
-        Some(_) => shop.threads.run_watched(stage, &mut |progress| unsafe { told.tell(progress) }, work),
+    match callback.function {
+        None => context.threads.run(|| work(&UNWATCHED)),
+        Some(_) => {
+            context.threads.run_watched(stage, &mut |progress| unsafe { callback.report(progress) }, work)
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! From the world of a structure-from-motion model to the vehicle's frame; `vehicle_gaussians._align` names the numbers.
+//! Alignment to the vehicle's frame; the fields of the results are named in `vehicle_gaussians._align`.
 
 use crate::arrays::{floats, matrix4, owned, rows, shape_text, values, vector};
 use crate::camera::Camera;
@@ -18,8 +18,8 @@ use vg::scene::Cloud;
 /// A matrix.
 type Matrix<'py> = Bound<'py, PyArray2<f64>>;
 
-/// vehicle_from_world, scale, residual, confidence, outlines' distance and that of the other way round, how many were
-/// used.
+/// vehicle_from_world, scale, residual, confidence, outline distance, outline distance with front and rear swapped,
+/// number of views or points used.
 type Found<'py> = (Matrix<'py>, f64, f64, f64, Option<f64>, Option<f64>, usize);
 
 #[pyfunction]
@@ -39,11 +39,11 @@ pub(crate) fn align_scan<'py>(
     if !matches!(scan.shape(), [_, 3]) {
         return Err(bad_value(py, "scan", &shape_text(scan.shape()), "(n, 3)"));
     }
-    // A copy: others may write to the array while the library works.
+    // Copied, because other threads may write to the array while the library works.
     let points = values(&scan)?.as_chunks::<3>().0.to_vec();
-    let views = views_of(py, &masks, &cameras, names)?;
+    let views = read_views(py, &masks, &cameras, names)?;
     let sparse = sparse.map_or_else(|| Ok(Vec::new()), |object| rows::<3>(object, "sparse"))?;
-    let heading = heading_of(py, heading)?;
+    let heading = read_heading(py, heading)?;
     let found = watched(py, threads, "align", progress, |watch| {
         let scan = Cloud::new(points).map_err(|e| renamed(e, "cloud", "scan"))?;
         to_scan_watched(&views, &sparse.iter().map(|&p| p.into()).collect::<Vec<_>>(), &scan, heading, watch)
@@ -64,9 +64,9 @@ pub(crate) fn align_box<'py>(
     #[pyo3(from_py_with = whole::threads)] threads: usize,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Found<'py>> {
-    let views = views_of(py, &masks, &cameras, names)?;
+    let views = read_views(py, &masks, &cameras, names)?;
     let (sparse, size) = (rows::<3>(sparse, "sparse")?, vector::<3>(size, "size")?);
-    let heading = heading_of(py, heading)?;
+    let heading = read_heading(py, heading)?;
     let BoxAlignment { vehicle_from_world, residual_m, confidence, views, .. } =
         watched(py, threads, "align", progress, |watch| {
             to_box_watched(
@@ -80,7 +80,7 @@ pub(crate) fn align_box<'py>(
     Ok(found(py, &vehicle_from_world, residual_m, confidence, None, views))
 }
 
-/// What is [`Found`], which pairs were used, and how far each ends from its place.
+/// The fields of [`Found`], which pairs were used, and the residual of each.
 type Fitted<'py> = (
     Matrix<'py>,
     f64,
@@ -126,7 +126,7 @@ pub(crate) fn align_folder<'py>(
     #[pyo3(from_py_with = whole::threads)] threads: usize,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Found<'py>> {
-    let heading = heading_of(py, heading)?;
+    let heading = read_heading(py, heading)?;
     let (_, found) = watched(py, threads, "align", progress, |watch| {
         folder_to_scan_watched(&path, scan.as_deref(), heading, watch)
     })?;
@@ -151,7 +151,7 @@ fn found<'py>(
     (matrix, vehicle_from_world.scale, residual_m, confidence, residual_px, other_px, used)
 }
 
-fn views_of(
+fn read_views(
     py: Python<'_>,
     masks: &[Option<Bound<'_, PyAny>>],
     cameras: &[Bound<'_, Camera>],
@@ -173,7 +173,7 @@ fn views_of(
     cameras.iter().enumerate().map(view).collect()
 }
 
-fn heading_of(py: Python<'_>, name: &str) -> PyResult<Heading> {
+fn read_heading(py: Python<'_>, name: &str) -> PyResult<Heading> {
     match name {
         "auto" => Ok(Heading::Auto),
         "forward" => Ok(Heading::Forward),

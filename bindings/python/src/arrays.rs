@@ -1,4 +1,4 @@
-//! NumPy arrays in and out.
+//! Conversion from and to NumPy arrays.
 
 use crate::errors::{bad_type, bad_value};
 use numpy::ndarray::{ArrayView, Dimension, IntoDimension};
@@ -37,8 +37,8 @@ pub(crate) fn array<'py, T: Element>(
     Ok(any.cast_into::<PyArray<T, _>>()?.try_readonly()?)
 }
 
-/// `object` as an array of float32. Floats of any precision are rounded; whole numbers are not taken from an array,
-/// where they are often of another unit, but from a list.
+/// `object` as an array of float32. Floats of any precision are rounded. Whole numbers are accepted in a list but not
+/// in an array, where they often have another unit.
 pub(crate) fn floats<'py>(
     object: &Bound<'py, PyAny>,
     argument: &str,
@@ -61,7 +61,7 @@ pub(crate) fn values<'a, T: Element>(array: &'a PyReadonlyArrayDyn<'_, T>) -> Py
     Ok(array.as_slice()?)
 }
 
-/// A shape as Python writes it.
+/// A shape in Python's notation.
 pub(crate) fn shape_text(shape: &[usize]) -> String {
     match shape {
         [one] => format!("shape ({one},)"),
@@ -69,7 +69,7 @@ pub(crate) fn shape_text(shape: &[usize]) -> String {
     }
 }
 
-/// Anything NumPy makes float64 numbers of, and its shape.
+/// Any object that NumPy converts to float64, and its shape.
 pub(crate) fn numbers(
     object: &Bound<'_, PyAny>,
     argument: &str,
@@ -178,7 +178,7 @@ pub(crate) fn matrix4<'py>(py: Python<'py>, rows: &[f64]) -> Bound<'py, PyArray<
 /// A `vehicle_gaussians._frozen.FrozenArray` over memory of `owner`, which it keeps alive.
 ///
 /// # Safety
-/// `view` must look at memory that stays where it is, unchanged, as long as `owner` lives.
+/// `view` must point to memory that does not move or change as long as `owner` lives.
 #[expect(unsafe_code)]
 pub(crate) unsafe fn borrowed<'py, T: Element, D: Dimension>(
     owner: Bound<'py, PyAny>,
@@ -186,9 +186,9 @@ pub(crate) unsafe fn borrowed<'py, T: Element, D: Dimension>(
 ) -> PyResult<Bound<'py, PyArray<T, D>>> {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
     let class = CLASS.import(owner.py(), "vehicle_gaussians._frozen", "FrozenArray")?.clone();
-    // SAFETY: the caller's promise.
+    // SAFETY: required of the caller.
     let array = unsafe { PyArray::borrow_from_array(view, owner) };
-    // Python cannot set the flag again: the array does not own its memory, and its owner offers no way to write.
+    // Python cannot set the flag again: the array does not own its memory, and its owner is not writable.
     let array = array.readwrite().make_nonwriteable();
     Ok(array.call_method1("view", (class,))?.cast_into()?)
 }

@@ -13,7 +13,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use vg::Pose;
 use vg::geometry::{CameraModel, Distortion, Intrinsics, OpenCvModel, Similarity, frame};
 
-/// A posed camera. It does not change: methods return new ones.
+/// An immutable posed camera: methods return new cameras.
 ///
 ///     >>> K = [[600, 0, 320], [0, 600, 240], [0, 0, 1]]
 ///     >>> camera = Camera.from_matrix(K, vehicle_from_camera, width=640, height=480)
@@ -26,7 +26,7 @@ pub(crate) struct Camera {
 
 #[pymethods]
 impl Camera {
-    /// From a COLMAP camera model, by name or number, and its parameters in COLMAP's order.
+    /// Makes a camera from a COLMAP camera model, by name or number, and its parameters in COLMAP's order.
     ///
     /// vehicle_from_camera is a 3x4 or 4x4 rigid transform in metres; camera axes are x right, y down, z forward.
     ///
@@ -54,9 +54,9 @@ impl Camera {
             .map_err(|e| from_library(py, e))
     }
 
-    /// From a 3x3 matrix K of focal lengths and principal point in pixels, without skew.
+    /// Makes a camera from a 3x3 matrix K of focal lengths and principal point in pixels, without skew.
     ///
-    /// The centre of the top-left pixel is (0.5, 0.5), as in COLMAP: a principal point in the middle is width / 2. For
+    /// The centre of the top-left pixel is (0.5, 0.5), as in COLMAP: a principal point in the centre is width / 2. For
     /// the K of OpenCV's calibration use from_opencv. distortion is k1, k2, p1, p2[, k3[, k4, k5, k6]].
     ///
     ///     >>> camera = Camera.from_matrix([[600, 0, 320], [0, 600, 240], [0, 0, 1]], vehicle_from_camera, 640, 480)
@@ -77,12 +77,12 @@ impl Camera {
         Ok(camera)
     }
 
-    /// From OpenCV's calibration, which puts the centre of the top-left pixel at (0, 0): half a pixel is added to the
-    /// principal point.
+    /// Makes a camera from OpenCV's calibration. OpenCV has the centre of the top-left pixel at (0, 0), so half a pixel
+    /// is added to the principal point.
     ///
-    /// distortion is that of cv2.calibrateCamera or, with fisheye=True, of cv2.fisheye. Instead of the pose, rvec and tvec
-    /// as cv2.solvePnP and cv2.calibrateCamera return them, from the world of the object's points; without
-    /// vehicle_from_world, a 4x4 similarity, that world is the vehicle's frame.
+    /// distortion is that of cv2.calibrateCamera or, with fisheye=True, of cv2.fisheye. rvec and tvec replace the pose,
+    /// as cv2.solvePnP and cv2.calibrateCamera return them, from the world of the object's points. vehicle_from_world
+    /// is a 4x4 similarity; without it, that world is the vehicle's frame.
     ///
     ///     >>> K = [[600, 0, 319.5], [0, 600, 239.5], [0, 0, 1]]
     ///     >>> camera = Camera.from_opencv(K, vehicle_from_camera, 640, 480)
@@ -112,7 +112,7 @@ impl Camera {
         let model = if fisheye { OpenCvModel::Fisheye } else { OpenCvModel::Standard };
         let distortion = match distortion {
             None => Vec::new(),
-            // OpenCV hands out (1, n) and (n, 1) too.
+            // OpenCV also returns (1, n) and (n, 1).
             Some(object) => numbers(object, "distortion", "a list of numbers")?.1,
         };
         let pose = match (vehicle_from_camera, rvec, tvec) {
@@ -131,8 +131,9 @@ impl Camera {
             .map_err(|e| from_library(py, e))
     }
 
-    /// A pinhole camera at eye, a point of the vehicle's frame in metres, whose optical axis meets target. Its picture
-    /// shows fov_y_degrees from top to bottom, and up is up in it. For another lens: with_pose.
+    /// Makes a pinhole camera at eye, a point of the vehicle's frame in metres, whose optical axis goes through target.
+    /// Its picture shows fov_y_degrees from top to bottom, and the direction up points up. For another lens use
+    /// with_pose.
     ///
     ///     >>> camera = Camera.look_at((6, -4, 1.5), (0, 0, 0.7), 640, 480)
     ///     >>> camera.project([[0, 0, 0.7]]).round(6)
@@ -155,10 +156,10 @@ impl Camera {
             .map_err(|e| from_library(eye.py(), e))
     }
 
-    /// The pixels (n, 2), column and row, of points (n, 3) of the vehicle's frame, metres; with depth=True a pair of them
-    /// and the depths (n,) along the optical axis, metres. NaN where the camera has no picture of a point: behind it, and
-    /// beyond the angle at which its lens folds back. The centre of the top-left pixel is (0.5, 0.5); pixels outside 0 to
-    /// width and 0 to height lie beside the picture.
+    /// Projects points (n, 3) of the vehicle's frame, metres, to pixels (n, 2), column and row; with depth=True returns
+    /// a pair of the pixels and the depths (n,) along the optical axis, metres. NaN where the camera does not see a
+    /// point: behind it, and beyond the angle at which its lens folds back. The centre of the top-left pixel is (0.5,
+    /// 0.5); pixels beyond 0 to width and 0 to height are outside the picture.
     ///
     ///     >>> pixels, depths = camera.project(car.means, depth=True)
     #[pyo3(signature = (points, depth=false))]
@@ -178,8 +179,9 @@ impl Camera {
         }
     }
 
-    /// The points (n, 3) of the vehicle's frame, metres, behind pixels (n, 2), column and row, at depths (n,) along the
-    /// optical axis, metres. NaN where a depth is no measurement (0, negative, NaN), and where the lens has no ray.
+    /// Returns the points (n, 3) of the vehicle's frame, metres, behind pixels (n, 2), column and row, at depths (n,)
+    /// along the optical axis, metres. NaN where a depth is no measurement (0, negative, NaN), and where the lens
+    /// defines no ray.
     ///
     ///     >>> point = camera.unproject([[320.0, 240.0]], [6.0])
     #[pyo3(signature = (pixels, depths))]
@@ -202,7 +204,7 @@ impl Camera {
         Ok(owned(py, (pixels.len(), 3), points))
     }
 
-    /// The same camera for pictures resized to width x height.
+    /// The camera for pictures resized to width x height.
     ///
     ///     >>> half = camera.scaled(camera.width // 2, camera.height // 2)
     #[pyo3(signature = (width, height))]
@@ -232,7 +234,7 @@ impl Camera {
         Ok(Self { inner: part })
     }
 
-    /// The same camera, lens included, in another place.
+    /// The camera, including its lens, at another pose.
     ///
     ///     >>> moved = camera.with_pose(other_vehicle_from_camera)
     #[pyo3(signature = (vehicle_from_camera))]
@@ -241,26 +243,26 @@ impl Camera {
         Ok(Self { inner: vg::Camera { vehicle_from_camera, ..self.inner } })
     }
 
-    /// Columns.
+    /// Width of the picture, pixels.
     #[getter]
     fn width(&self) -> u32 {
         self.inner.width
     }
 
-    /// Rows.
+    /// Height of the picture, pixels.
     #[getter]
     fn height(&self) -> u32 {
         self.inner.height
     }
 
-    /// 3x3; the centre of the top-left pixel is (0.5, 0.5).
+    /// Camera matrix, 3x3; the centre of the top-left pixel is (0.5, 0.5).
     #[getter(K)]
     fn matrix<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let Intrinsics { fx, fy, cx, cy } = self.inner.intrinsics;
         owned(py, (3, 3), vec![fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0])
     }
 
-    /// 4x4, metres.
+    /// Pose, 4x4, metres.
     #[getter]
     fn vehicle_from_camera<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         matrix4(py, &self.inner.vehicle_from_camera.to_row_major())
@@ -297,7 +299,7 @@ impl Camera {
     fn __hash__(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
         (self.inner.width, self.inner.height).hash(&mut hasher);
-        // Adding 0 makes one of both zeros, which are equal.
+        // Adding 0 turns -0 into 0, which is equal to it.
         self.inner.center().to_array().map(|c| (c + 0.0).to_bits()).hash(&mut hasher);
         hasher.finish()
     }
@@ -353,10 +355,10 @@ fn camera_model(model: &Bound<'_, PyAny>) -> PyResult<CameraModel> {
     })
 }
 
-/// vehicle_from_camera (4x4) of COLMAP's world-to-camera quaternion (w, x, y, z) and translation.
+/// Returns vehicle_from_camera (4x4) for COLMAP's world-to-camera quaternion (w, x, y, z) and translation.
 ///
-/// vehicle_from_world is the similarity (4x4) from the model's world to the vehicle's frame; without, they are one.
-/// pycolmap keeps quaternions as (x, y, z, w).
+/// vehicle_from_world is the similarity (4x4) from the model's world to the vehicle's frame; without it, the two
+/// are the same. pycolmap stores quaternions as (x, y, z, w).
 ///
 ///     >>> vehicle_from_camera = pose_from_colmap([1, 0, 0, 0], [0, 0, 5], vehicle_from_world)
 #[pyfunction]
@@ -371,9 +373,10 @@ pub(crate) fn pose_from_colmap<'py>(
     in_vehicle_frame(qvec.py(), pose, vehicle_from_world)
 }
 
-/// vehicle_from_camera (4x4) of OpenCV's world-to-camera rotation vector and translation, as cv2.solvePnP returns them.
+/// Returns vehicle_from_camera (4x4) for OpenCV's world-to-camera rvec and tvec, as cv2.solvePnP returns them.
 ///
-/// vehicle_from_world is the similarity (4x4) from that world to the vehicle's frame; without, they are one.
+/// vehicle_from_world is the similarity (4x4) from that world to the vehicle's frame; without it, the two are the
+/// same.
 ///
 ///     >>> vehicle_from_camera = pose_from_opencv([0.0, 0.0, 1.5], [0.0, 0.5, 6.0])
 #[pyfunction]
@@ -393,7 +396,7 @@ fn opencv_pose(
     tvec: &Bound<'_, PyAny>,
     vehicle_from_world: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Pose> {
-    // OpenCV hands out (3, 1).
+    // OpenCV returns (3, 1).
     let three = |object, argument| {
         let allowed = "3 numbers";
         let (shape, values) = numbers(object, argument, allowed)?;
@@ -407,10 +410,11 @@ fn opencv_pose(
     }
 }
 
-/// vehicle_from_camera (4x4) of a camera-to-world matrix with OpenGL's camera axes (x right, y up, z backward), as in
-/// nerfstudio's transforms.json and in Blender.
+/// Returns vehicle_from_camera (4x4) for a camera-to-world matrix with OpenGL's camera axes (x right, y up, z
+/// backward), as in nerfstudio's transforms.json and in Blender.
 ///
-/// vehicle_from_world is the similarity (4x4) from that world to the vehicle's frame; without, they are one.
+/// vehicle_from_world is the similarity (4x4) from that world to the vehicle's frame; without it, the two are the
+/// same.
 ///
 ///     >>> vehicle_from_camera = pose_from_opengl(frame["transform_matrix"])
 #[pyfunction]
@@ -424,9 +428,9 @@ pub(crate) fn pose_from_opengl<'py>(
     in_vehicle_frame(camera_to_world.py(), pose, vehicle_from_world)
 }
 
-/// vehicle_from_camera (4x4) of a vehicle that was tracked as a box: the poses (3x4 or 4x4, metres) of the box and of
-/// the camera in one frame (ego, map, UTM) at the moment of the picture. The box's axes are x forward, y left, z up, and
-/// its origin lies on the vehicle's plane of symmetry.
+/// Returns vehicle_from_camera (4x4) for a vehicle that was tracked as a box, from the poses (3x4 or 4x4, metres)
+/// of the box and of the camera in a common frame (ego, map, UTM) at the time of the picture. The box's axes are x
+/// forward, y left, z up, and its origin lies on the vehicle's plane of symmetry.
 ///
 ///     >>> vehicle_from_camera = pose_from_box(ego_from_vehicle, ego_from_camera)
 #[pyfunction]
@@ -452,8 +456,8 @@ fn in_vehicle_frame<'py>(
     Ok(matrix4(py, &pose.to_row_major()))
 }
 
-/// The similarity (4x4) that best takes points onto points, both (n, 3) with n >= 3 (Umeyama 1991): for example
-/// vehicle_from_world from camera centres that are known in both frames.
+/// Returns the similarity (4x4) that best maps source to target, both (n, 3) with n >= 3 (Umeyama 1991): for
+/// example vehicle_from_world from camera centres that are known in both frames.
 ///
 ///     >>> vehicle_from_world = similarity_from_points(centers_in_world, centers_in_vehicle)
 #[pyfunction]

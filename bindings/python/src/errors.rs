@@ -1,4 +1,4 @@
-//! The way out of the GIL and back: errors become `VgError`, and so do panics.
+//! Calls without the GIL; errors and panics become `VgError`.
 
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -10,13 +10,13 @@ use std::sync::{Mutex, PoisonError};
 pub(crate) use vg::error::Status;
 use vg::progress::Threads;
 
-/// Text and place of the last panic, for the message that its payload alone cannot give.
+/// Text and place of the last panic, because its payload does not contain the place.
 static LAST_PANIC: Mutex<Option<(String, String)>> = Mutex::new(None);
 
-/// A `vehicle_gaussians.VgError`, of the subclass that is its status's.
+/// Makes a `vehicle_gaussians.VgError` of the subclass of its status.
 pub(crate) fn vg_error(py: Python<'_>, status: Status, message: impl Into<String>) -> PyErr {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-    // Made here and not by PyErr::from_type, whose error would have the class that was asked for.
+    // Not made by PyErr::from_type, which would use exactly this class instead of its subclass.
     let class = CLASS.import(py, "vehicle_gaussians._errors", "VgError");
     match class.and_then(|class| class.call1((status as i32, message.into()))) {
         Ok(error) => PyErr::from_value(error),
@@ -24,12 +24,12 @@ pub(crate) fn vg_error(py: Python<'_>, status: Status, message: impl Into<String
     }
 }
 
-/// An argument of the right kind with a value that is not accepted.
+/// The error of an argument of the right kind with a value that is not accepted.
 pub(crate) fn bad_value(py: Python<'_>, argument: &str, found: &str, allowed: &str) -> PyErr {
     vg_error(py, Status::Argument, format!("{argument}: {found}; allowed: {allowed}"))
 }
 
-/// An argument of the wrong kind.
+/// The error of an argument of the wrong kind.
 pub(crate) fn bad_type(argument: &str, found: &str, allowed: &str) -> PyErr {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
     let message = format!("{argument}: {found}; allowed: {allowed}");
@@ -39,7 +39,7 @@ pub(crate) fn bad_type(argument: &str, found: &str, allowed: &str) -> PyErr {
     })
 }
 
-/// The error of a function that calls its argument `from`, for callers who know it as `to`.
+/// Renames the argument of an error from the library's name, `from`, to Python's name, `to`.
 pub(crate) fn renamed(error: vg::Error, from: &str, to: &str) -> vg::Error {
     match error {
         vg::Error::Argument { argument, found, allowed } => {
@@ -86,9 +86,9 @@ pub(crate) fn pooled<T: Send>(
     detached(py, || Threads::new(threads)?.run(work))
 }
 
-/// Keeps panics off standard error: they are caught, and their text travels in the exception.
+/// Prevents panics from printing: they are caught, and the exception contains their text.
 pub(crate) fn keep_panics_quiet() {
-    // The extension module has a standard library of its own: nobody else's panics pass here.
+    // The extension module has its own standard library, so this hook only sees its own panics.
     std::panic::set_hook(Box::new(|info| {
         let place = info.location().map(ToString::to_string).unwrap_or_default();
         *LAST_PANIC.lock().unwrap_or_else(PoisonError::into_inner) = Some((text(info.payload()), place));
@@ -109,7 +109,7 @@ fn text(payload: &(dyn Any + Send)) -> String {
     text.or_else(|| payload.downcast_ref().map(String::as_str)).unwrap_or("panic").to_owned()
 }
 
-/// For the tests: what a defect of the library would look like.
+/// Panics, so that tests can check how a defect of the library is reported.
 #[pyfunction]
 #[pyo3(name = "_panic_on_a_worker_thread")]
 pub(crate) fn panic_on_a_worker_thread(py: Python<'_>) -> PyResult<()> {

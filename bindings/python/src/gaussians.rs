@@ -26,18 +26,18 @@ use vg::render::{
     Renderer,
 };
 
-/// Draws for everybody: keeps its working memory, and the last lens, from picture to picture.
+/// Renderer shared by all calls; it keeps its working memory and the last lens between pictures.
 static RENDERER: LazyLock<CpuRenderer> = LazyLock::new(CpuRenderer::new);
 
-/// The Gaussians of a vehicle, in its frame (x forward, y left, z up, metres). They do not change: methods return
-/// new ones, and the arrays are read-only views that keep them alive.
+/// The Gaussians of a vehicle, in its frame (x forward, y left, z up, metres). They are immutable: methods return
+/// new Gaussians, and the arrays are read-only views that keep them alive.
 ///
 ///     >>> car = Gaussians.load_ply("car.ply")
 ///     >>> picture = car.render(camera)
 ///     >>> red = car.sh.copy()
 ///     >>> red[:, 0] = [1.77, -1.77, -1.77]
 ///     >>> car = Gaussians.from_arrays(car.means, car.scales, car.quats, car.opacities, red)
-// A mapping, not a sequence: NumPy is not to take them for nested lists.
+// A mapping, not a sequence, so that NumPy does not convert Gaussians as nested lists.
 #[pyclass(module = "vehicle_gaussians", frozen, eq, mapping)]
 #[derive(PartialEq)]
 pub(crate) struct Gaussians {
@@ -46,14 +46,14 @@ pub(crate) struct Gaussians {
 }
 
 impl Gaussians {
-    pub(crate) fn of(inner: vg::Gaussians) -> Self {
+    pub(crate) fn new(inner: vg::Gaussians) -> Self {
         Self { inner: Arc::new(inner) }
     }
 }
 
 #[pymethods]
 impl Gaussians {
-    /// From arrays of floats, of n Gaussians: means (n, 3) and scales (n, 3), standard deviations, in metres; quats
+    /// Makes n Gaussians from arrays of floats: means (n, 3) and scales (n, 3), standard deviations, in metres; quats
     /// (n, 4) as (w, x, y, z) of any norm; opacities (n,) from 0 to 1; sh (n, (degree + 1)^2, 3).
     ///
     ///     >>> means, scales, quats = np.zeros((2, 3)), np.full((2, 3), 0.1), np.tile([1.0, 0, 0, 0], (2, 1))
@@ -91,7 +91,7 @@ impl Gaussians {
             values(&opacities)?.to_vec(),
             values(&sh)?.to_vec(),
         )
-        .map(Self::of)
+        .map(Self::new)
         .map_err(|e| from_library(py, e))
     }
 
@@ -102,11 +102,11 @@ impl Gaussians {
     #[pyo3(signature = (path))]
     fn load_ply(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let (inner, _) = pooled(py, 1, || ply::read(&path))?;
-        Ok(Self::of(inner))
+        Ok(Self::new(inner))
     }
 
-    /// Writes a PLY file in the layout of 3D Gaussian Splatting. A file that is there is replaced only once the new
-    /// one is complete.
+    /// Writes a PLY file in the layout of 3D Gaussian Splatting. An existing file is replaced only after the new one is
+    /// complete.
     ///
     ///     >>> car.save_ply("copy.ply")
     #[pyo3(signature = (path))]
@@ -114,7 +114,7 @@ impl Gaussians {
         pooled(py, 1, || ply::write(&path, &self.inner))
     }
 
-    /// From the bytes of a PLY file in the layout of 3D Gaussian Splatting.
+    /// Reads the bytes of a PLY file in the layout of 3D Gaussian Splatting.
     ///
     ///     >>> same = Gaussians.from_ply_bytes(car.to_ply_bytes())
     #[staticmethod]
@@ -122,13 +122,13 @@ impl Gaussians {
     fn from_ply_bytes(py: Python<'_>, data: &Bound<'_, PyAny>) -> PyResult<Self> {
         let kind = || data.get_type().name().map_or_else(|_| "an object".into(), |n| n.to_string());
         let buffer = PyBuffer::<u8>::get(data).map_err(|_| bad_type("data", &kind(), "bytes"))?;
-        // A copy: others may write to the memory while the library works.
+        // Copied, because other threads may write to the memory while the library works.
         let bytes = buffer.to_vec(py)?;
         let (inner, _) = pooled(py, 1, || ply::from_bytes(&bytes))?;
-        Ok(Self::of(inner))
+        Ok(Self::new(inner))
     }
 
-    /// What save_ply writes, as bytes.
+    /// Returns the bytes that save_ply writes.
     ///
     ///     >>> car.to_ply_bytes()[:4]
     ///     b'ply\n'
@@ -148,11 +148,11 @@ impl Gaussians {
         let indices = SELECTED.import(py, "vehicle_gaussians._select", "indices")?.call1((index, n))?;
         let indices = array::<i64>(&indices, "index", "whole numbers")?;
         let indices: Vec<usize> = values(&indices)?.iter().map(|&i| i as usize).collect();
-        pooled(py, 1, || self.inner.selected(&indices)).map(Self::of)
+        pooled(py, 1, || self.inner.selected(&indices)).map(Self::new)
     }
 
-    /// Those whose centre lies in the box from low to high, three numbers each, metres, its faces included. Infinite sides
-    /// are open.
+    /// The Gaussians whose centre lies in the box from low to high, three numbers each, metres, including its faces.
+    /// Infinite sides are open.
     ///
     ///     >>> front = car.cropped((0, -10, -10), (10, 10, 10))
     #[pyo3(signature = (low, high))]
@@ -160,7 +160,7 @@ impl Gaussians {
         let py = low.py();
         let [low, high] =
             [vector::<3>(low, "low")?, vector::<3>(high, "high")?].map(|corner| corner.map(|c| c as f32));
-        pooled(py, 1, || self.inner.cropped(low, high)).map(Self::of)
+        pooled(py, 1, || self.inner.cropped(low, high)).map(Self::new)
     }
 
     /// Covariance matrices in the vehicle's frame, square metres. (n, 3, 3)
@@ -173,7 +173,7 @@ impl Gaussians {
         Ok(owned(py, (upper.len(), 3, 3), upper.into_iter().flat_map(whole).collect()))
     }
 
-    /// count cameras on a circle around the vehicle, from its front towards its left, each with all of it in its picture.
+    /// Returns count cameras on a circle around the vehicle, from its front to its left, each with all of it in view.
     ///
     ///     >>> pictures = Renderer(car).render_many(car.turntable(36, 320, 240))
     #[pyo3(signature = (count, width, height, *, elevation_degrees=12.0, fov_y_degrees=35.0))]
@@ -187,7 +187,7 @@ impl Gaussians {
         fov_y_degrees: f64,
     ) -> PyResult<Vec<Camera>> {
         let Some((low, high)) = self.inner.bounds() else {
-            return Err(bad_value(py, "turntable", "no Gaussians", "at least one to walk around"));
+            return Err(bad_value(py, "turntable", "no Gaussians", "at least one"));
         };
         let table = Turntable { elevation_degrees, fov_y_degrees };
         let cameras = table.cameras(low, high, count, width, height).map_err(|e| from_library(py, e))?;
@@ -200,21 +200,21 @@ impl Gaussians {
     ///     True
     #[pyo3(signature = ())]
     fn mirrored(&self, py: Python<'_>) -> PyResult<Self> {
-        pooled(py, 1, || Ok(self.inner.mirrored())).map(Self::of)
+        pooled(py, 1, || Ok(self.inner.mirrored())).map(Self::new)
     }
 
-    /// These in another frame: to_from_vehicle is a 4x4 similarity. Colours turn with the vehicle. Coordinates must stay
-    /// below 16384 m, where a float32 still holds a millimetre.
+    /// The Gaussians in another frame: to_from_vehicle is a 4x4 similarity. Colours turn with the vehicle. Coordinates
+    /// must stay below 16384 m, where a float32 still resolves a millimetre.
     ///
     ///     >>> twice_as_large = car.transformed(np.diag([2.0, 2.0, 2.0, 1.0]))
     #[pyo3(signature = (to_from_vehicle))]
     fn transformed(&self, to_from_vehicle: &Bound<'_, PyAny>) -> PyResult<Self> {
         let similarity = similarity(to_from_vehicle, "to_from_vehicle")?;
         let inner = pooled(to_from_vehicle.py(), 0, || self.inner.transformed(&similarity))?;
-        Ok(Self::of(inner))
+        Ok(Self::new(inner))
     }
 
-    /// These, then those of other, at the higher of their degrees of spherical harmonics.
+    /// These Gaussians followed by those of other, at the higher of their degrees of spherical harmonics.
     ///
     ///     >>> both = car.merged(car.mirrored())
     ///     >>> len(both) == 2 * len(car)
@@ -222,15 +222,15 @@ impl Gaussians {
     #[pyo3(signature = (other))]
     fn merged(&self, py: Python<'_>, other: &Bound<'_, Self>) -> PyResult<Self> {
         let other = &other.get().inner;
-        pooled(py, 1, || Ok(self.inner.merged(other))).map(Self::of)
+        pooled(py, 1, || Ok(self.inner.merged(other))).map(Self::new)
     }
 
-    /// The picture a camera takes: uint8 (height, width, 3), or (height, width, 4) with straight alpha on a
-    /// "transparent" background. With dtype float32 colours are not clamped above 1. With depth=True a pair of the
-    /// picture and its depth in metres, float32 (height, width), 0 where there is nothing.
+    /// Renders a camera's picture: uint8 (height, width, 3), or (height, width, 4) with straight alpha on a
+    /// "transparent" background. With dtype float32 colours are not clamped above 1. With depth=True returns a pair of
+    /// the picture and its depth in metres, float32 (height, width), 0 where there is no Gaussian.
     ///
-    /// background is "white", "black", "transparent" or (r, g, b) from 0 to 1; near and far are metres; sh_degree leaves
-    /// out the colour's bands above it; threads=0 means one per core.
+    /// background is "white", "black", "transparent" or (r, g, b) from 0 to 1; near and far are metres; bands of the
+    /// colour above sh_degree are left out; threads=0 means one per core.
     ///
     ///     >>> picture = car.render(camera)
     ///     >>> rgba, depth = car.render(camera, "transparent", depth=True)
@@ -253,7 +253,7 @@ impl Gaussians {
         #[pyo3(from_py_with = whole::sh_degree)] sh_degree: u8,
     ) -> PyResult<Bound<'py, PyAny>> {
         let background = background.map_or(Ok(Background::Color([1.0; 3])), parse_background)?;
-        let kind = dtype.map_or(Ok(Kind::Bytes), Kind::of)?;
+        let kind = dtype.map_or(Ok(Kind::Bytes), Kind::from_dtype)?;
         let options =
             RenderOptions { background, antialiased, near, far, sh_degree, ..RenderOptions::default() };
         let camera = &camera.get().inner;
@@ -272,10 +272,10 @@ impl Gaussians {
         }
     }
 
-    /// The picture as losses look at it: Planes of color (height, width, 3), over the background or, with a
-    /// "transparent" one, premultiplied; alpha and depth (height, width). All float32; arguments as those of render,
-    /// and depth_mode, "expected" or "accumulated": depth times alpha. backend is "cpu", "gpu", an error without, or
-    /// "auto", the CPU: Renderer is for Gaussians that are drawn many times.
+    /// Renders a picture for use in a loss: Planes of color (height, width, 3), over the background or, with a
+    /// "transparent" one, premultiplied; alpha and depth (height, width). All are float32. Arguments are those of
+    /// render, and depth_mode, "expected" or "accumulated" (depth times alpha). backend is "cpu", "gpu" (an error if
+    /// there is none), or "auto", the CPU; to draw the same Gaussians many times, use Renderer.
     ///
     ///     >>> color, alpha, depth = car.render_planes(camera, "black")
     #[pyo3(signature = (
@@ -314,11 +314,12 @@ impl Gaussians {
         ))
     }
 
-    /// Goes back from the gradient of a loss with respect to the planes of a picture, as render_planes draws it, to
-    /// Gradients of everything the picture is made of. color (height, width, 3), alpha and depth (height, width) are
-    /// float32, finite; None where the loss does not look. The picture is drawn again on the way.
+    /// Propagates the gradient of a loss with respect to the planes of a picture, as drawn by render_planes, back to
+    /// Gradients of all its inputs. color (height, width, 3), alpha and depth (height, width) are float32 and finite;
+    /// None where the loss does not use the plane. The picture is rendered again for that.
     ///
-    /// Constants are the order of depth, the pixels a Gaussian reaches, what is too faint to be drawn, near and far.
+    /// Treated as constant are the depth order, the pixels that a Gaussian reaches, the cut of faint Gaussians, near
+    /// and far.
     ///
     ///     >>> planes = car.render_planes(camera)
     ///     >>> gradients = car.render_backward(camera, color=2 * (planes.color - photograph))
@@ -448,7 +449,7 @@ impl Gaussians {
     fn __hash__(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
         (self.inner.len(), self.inner.sh_degree()).hash(&mut hasher);
-        // Adding 0 makes one of both zeros, which are equal.
+        // Adding 0 turns -0 into 0, which is equal to it.
         self.inner.means().first().map(|mean| mean.map(|c| (c + 0.0).to_bits())).hash(&mut hasher);
         hasher.finish()
     }
@@ -471,10 +472,10 @@ type Arrays<'py> = (
     Bound<'py, PyArray3<f32>>,
 );
 
-/// Gaussians of the parts that `Gaussians.__reduce__` gives.
+/// Makes Gaussians from the parts that `Gaussians.__reduce__` returns.
 #[pyfunction]
 #[pyo3(name = "_gaussians")]
-pub(crate) fn of_arrays(
+pub(crate) fn gaussians_from_parts(
     means: &Bound<'_, PyAny>,
     scales: &Bound<'_, PyAny>,
     quats: &Bound<'_, PyAny>,
@@ -491,7 +492,7 @@ fn view<'py, T: Element, D: numpy::ndarray::IntoDimension>(
     values: &[T],
 ) -> PyResult<Bound<'py, PyArray<T, D::Dim>>> {
     let view = ArrayView::from_shape(shape.into_dimension(), values).expect("as many values as the shape");
-    // SAFETY: the class is frozen and never touches its arrays, so that they stay as they are while it lives.
+    // SAFETY: the class is frozen and never changes its arrays, so they are valid as long as it lives.
     #[expect(unsafe_code)]
     unsafe {
         borrowed(owner.clone().into_any(), &view)
@@ -525,7 +526,7 @@ pub(crate) fn parse_background(object: &Bound<'_, PyAny>) -> PyResult<Background
     }
 }
 
-/// The graphics processor, where it is asked for.
+/// The GPU renderer, if it is requested.
 fn device(py: Python<'_>, backend: &str) -> PyResult<Option<Trainer>> {
     match chosen(py, "backend", backend)? {
         Backend::Gpu => Ok(Some(detached(py, || trainer(Backend::Gpu))?.0)),
@@ -533,7 +534,7 @@ fn device(py: Python<'_>, backend: &str) -> PyResult<Option<Trainer>> {
     }
 }
 
-/// How planes are drawn, from what is not a number: a background, white for None, and a mode of depth.
+/// Options for rendering planes from a background, white for None, and a depth mode.
 fn planes(
     py: Python<'_>,
     background: Option<&Bound<'_, PyAny>>,
@@ -573,7 +574,7 @@ fn plane<const N: usize>(
     Ok(values.to_vec())
 }
 
-/// What the numbers of a picture are.
+/// Number type of a picture.
 #[derive(Clone, Copy)]
 enum Kind {
     Bytes,
@@ -581,7 +582,7 @@ enum Kind {
 }
 
 impl Kind {
-    fn of(dtype: &Bound<'_, PyAny>) -> PyResult<Self> {
+    fn from_dtype(dtype: &Bound<'_, PyAny>) -> PyResult<Self> {
         let py = dtype.py();
         let asked = PyArrayDescr::new(py, dtype)?;
         if asked.is_equiv_to(&numpy::dtype::<u8>(py)) {

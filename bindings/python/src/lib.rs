@@ -1,9 +1,9 @@
-//! `vehicle_gaussians._native`: the library as Python sees it, NumPy arrays in and out.
+//! `vehicle_gaussians._native`: the extension module, whose input and output are NumPy arrays.
 //!
 //! * Pixels are copied once on the way in; Gaussians are not copied on the way out (read-only views).
-//! * The library works without the GIL, on threads of its own that end with the call, so that a forked process is
-//!   none the worse for what its parent drew.
-//! * Whatever goes wrong is a `VgError`, or a `TypeError` for the wrong kind of object; a panic is no exception.
+//! * The library works without the GIL, on its own threads that end with the call, so that calls before a fork do not
+//!   affect the child process.
+//! * Every error is a `VgError`, also after a panic, or a `TypeError` for the wrong kind of object.
 
 mod align;
 mod arrays;
@@ -33,7 +33,7 @@ mod _native {
     #[pymodule_export]
     use crate::errors::panic_on_a_worker_thread;
     #[pymodule_export]
-    use crate::gaussians::{Gaussians, of_arrays};
+    use crate::gaussians::{Gaussians, gaussians_from_parts};
     #[pymodule_export]
     use crate::metrics::{picture_errors, surface_errors, view_errors};
     #[pymodule_export]

@@ -1,4 +1,4 @@
-//! How far a model is from photographs and from a scan; `vehicle_gaussians._metrics` names the numbers.
+//! Errors of a model; the fields of the results are named in `vehicle_gaussians._metrics`.
 
 use crate::arrays::{array, floats, shape_text, values};
 use crate::camera::Camera;
@@ -91,7 +91,7 @@ pub(crate) fn surface_errors(
     if !matches!(points.shape(), [_, 3]) {
         return Err(bad_value(py, "points", &shape_text(points.shape()), "(n, 3)"));
     }
-    // A copy: others may write to the array while the library works.
+    // Copied, because other threads may write to the array while the library works.
     let points = values(&points)?.as_chunks::<3>().0.to_vec();
     let options = SurfaceOptions { f_score_m: f_score, ..SurfaceOptions::default() };
     options.validate().map_err(|e| from_library(py, e))?;
@@ -112,7 +112,7 @@ pub(crate) fn surface_errors(
     ])
 }
 
-/// A picture as it looks on white, RGB in [0, 1], and its height and width.
+/// A picture composited on white, RGB in [0, 1], and its height and width.
 fn on_white(object: &Bound<'_, PyAny>, argument: &str) -> PyResult<(Vec<[f32; 3]>, [u32; 2])> {
     const ALLOWED: &str = "a NumPy array of uint8 or floats, (height, width, 3) or (height, width, 4)";
     let floats: Vec<f32>;

@@ -15,8 +15,8 @@ use vg::scene::mask::Label;
 
 /// A network in an ONNX file, opened by ONNX Runtime, for reconstruct's prior_model and head_model.
 ///
-/// It is opened once and may be used by any number of threads at a time; runs of it take turns. It holds its weights
-/// and threads until nobody refers to it any more. Not for a forked process.
+/// It is opened once and may be used by any number of threads at a time; its runs are serialised. It keeps its
+/// weights and threads until it is garbage-collected. It cannot be used in a forked process.
 ///
 ///     >>> network = Model("depth.onnx")  # doctest: +SKIP
 ///     >>> made = reconstruct(images, masks, cameras, prior="onnx", prior_model=network)  # doctest: +SKIP
@@ -27,13 +27,13 @@ pub(crate) struct Model {
 
 #[pymethods]
 impl Model {
-    /// Opens the network in the file at path; weights in files beside it are found by their names.
+    /// Opens the network in the file at path; external weight files in its folder are found by their names.
     ///
-    /// runtime: ONNX Runtime, the library or its folder; else what the environment variable VG_ONNXRUNTIME names, else
-    /// the one of an installed package onnxruntime. A process has one: the first that was loaded.
+    /// runtime: ONNX Runtime's library or its folder; by default the environment variable VG_ONNXRUNTIME, else an
+    /// installed package onnxruntime. A process has one runtime: the first that was loaded.
     /// provider: "cpu", or "cuda" for the first CUDA device.
-    /// fall_back: whether the processor steps in where the provider cannot be had.
-    /// threads: of the runtime's own, held as long as the model is open; 0 means one per core.
+    /// fall_back: whether the CPU is used if the provider is not available.
+    /// threads: threads of the runtime, kept as long as the model is open; 0 means one per core.
     /// prepack: whether weights are rearranged for speed, which can take as much memory again; None: where the files
     /// take less than 1 GiB.
     /// arena: whether the runtime keeps the memory of a run for the next one.
@@ -59,14 +59,14 @@ impl Model {
         Ok(Self { inner })
     }
 
-    /// The file.
+    /// Path of the file.
     #[getter]
     fn path(&self) -> PathBuf {
         self.inner.path().to_owned()
     }
 
     fn __reduce__(&self) -> PyResult<()> {
-        let way_out = "another process opens its file again: Model(path)";
+        let way_out = "another process must open the file again: Model(path)";
         Err(stays_here("Model", "a network that is open in this process", way_out))
     }
 
@@ -75,10 +75,10 @@ impl Model {
     }
 }
 
-/// The mask of a photograph that has none, by a segmentation network: bool (height, width), True where the vehicle is
-/// that stands at the origin of the camera's vehicle frame.
+/// Computes the mask of a photograph by a segmentation network: bool (height, width), True for the vehicle at the
+/// origin of the camera's vehicle frame.
 ///
-/// image: RGB, uint8 (height, width, 3); with a fourth channel, alpha is not looked at.
+/// image: RGB, uint8 (height, width, 3); the alpha of a fourth channel is ignored.
 /// threads: worker threads; 0 means one per core.
 ///
 ///     >>> mask = segment(Model("segmentation.onnx"), images[0], cameras[0])  # doctest: +SKIP

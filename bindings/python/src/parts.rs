@@ -1,5 +1,4 @@
-//! The parts that `pickle` takes objects into and puts them together from again, the same to the last bit; and those
-//! objects that have none.
+//! Parts of objects for `pickle`, which restores them bit for bit; and the error of objects that cannot be pickled.
 
 use crate::camera::Camera;
 use crate::errors::{bad_value, from_library};
@@ -11,7 +10,7 @@ use vg::geometry::CameraModel;
 /// COLMAP's model, width, height, parameters, and the pose's rows.
 pub(crate) type CameraParts = (&'static str, u32, u32, Vec<f64>, [f64; 12]);
 
-/// A camera of the parts that `Camera.__reduce__` gives.
+/// Makes a camera from the parts that `Camera.__reduce__` returns.
 #[pyfunction]
 #[pyo3(name = "_camera")]
 pub(crate) fn camera(
@@ -27,7 +26,7 @@ pub(crate) fn camera(
         .ok_or_else(|| bad_value(py, "model", &format!("{model:?}"), "what a Camera was pickled as"))?;
     let m = vehicle_from_camera;
     let mut pose = Pose::from_row_major("vehicle_from_camera", &m).map_err(library)?;
-    // Making a rotation orthonormal that is so already moves its last bits.
+    // Orthonormalising an orthonormal rotation again would change its last bits.
     let axis = |column: usize| [m[column], m[column + 4], m[column + 8]].into();
     (pose.rotation.x_axis, pose.rotation.y_axis, pose.rotation.z_axis) = (axis(0), axis(1), axis(2));
     vg::Camera::from_colmap("camera", known, width, height, &params, pose)
@@ -35,12 +34,12 @@ pub(crate) fn camera(
         .map_err(library)
 }
 
-/// A function of this module, as pickle finds it again.
+/// A function of this module by the name that pickle uses.
 pub(crate) fn function<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
     py.import("vehicle_gaussians._native")?.getattr(name)
 }
 
-/// The error of an object that belongs to its process, and the way out.
+/// The error of an object that cannot leave its process, with the alternative.
 pub(crate) fn stays_here(class: &str, holds: &str, way_out: &str) -> PyErr {
     PyTypeError::new_err(format!(
         "{class}: cannot be pickled or copied, because it holds {holds}; threads may share it, and {way_out}"

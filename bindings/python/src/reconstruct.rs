@@ -1,4 +1,4 @@
-//! Photographs in memory to Gaussians.
+//! Reconstruction from photographs in memory.
 
 use crate::arrays::{array, floats, owned, shape_text, values, vector};
 use crate::camera::Camera;
@@ -6,7 +6,7 @@ use crate::errors::{bad_type, bad_value, detached, from_library};
 use crate::gaussians::Gaussians;
 use crate::model::Model;
 use crate::renderer::chosen;
-use crate::watched::Teller;
+use crate::watched::ProgressFunction;
 use crate::whole;
 use numpy::{PyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -24,7 +24,7 @@ use vg::{Scene, View};
 /// Positions (n, 3) and colours (n, 3).
 type Points<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>);
 
-/// The Gaussians, the report as JSON, and the points if asked for.
+/// The Gaussians, the report as JSON, and the points if requested.
 #[pyfunction]
 #[pyo3(signature = (
     images, masks, cameras, depths, *, prior, prior_model, head_model, calibrate, symmetry, relight, photo, cloud,
@@ -90,17 +90,17 @@ pub(crate) fn reconstruct<'py>(
         baseline: None,
         ignore_offset: false,
     };
-    // Before the pixels are copied.
+    // Checked before the pixels are copied.
     options.validate().map_err(|e| from_library(py, e))?;
-    let mut scene = scene_of(py, &images, masks.as_deref(), &cameras, depths.as_deref(), names)?;
+    let mut scene = read_scene(py, &images, masks.as_deref(), &cameras, depths.as_deref(), names)?;
     scene.cloud = cloud.map_or(Ok(None), self::cloud)?;
 
-    let teller = Teller::new(progress)?;
+    let function = ProgressFunction::new(progress)?;
     let mut raised = None;
     let made = detached(py, || {
-        let mut tell = |state: Progress| teller.tell(state, &mut raised);
-        let made = vg::pipeline::reconstruct(&scene, &options, &mut tell)?;
-        // Nothing to say here if the library cannot write its own report: it is no part of the vehicle.
+        let mut report = |state: Progress| function.report(state, &mut raised);
+        let made = vg::pipeline::reconstruct(&scene, &options, &mut report)?;
+        // A report that cannot be written is left empty: the model is still valid.
         let report = serde_json::to_string(&made.report).unwrap_or_default();
         Ok((made, report))
     });
@@ -113,10 +113,10 @@ pub(crate) fn reconstruct<'py>(
         let positions = owned(py, (n, 3), cloud.positions.into_flattened());
         (positions, owned(py, (n, 3), cloud.colors.into_flattened()))
     });
-    Ok((Gaussians::of(made.gaussians), report, points))
+    Ok((Gaussians::new(made.gaussians), report, points))
 }
 
-/// By a number of steps, or by the time they take.
+/// The amount of refinement: a number of steps, or a time.
 fn refinement(
     py: Python<'_>,
     iterations: Option<u32>,
@@ -132,7 +132,7 @@ fn refinement(
         (None, Some(seconds)) => Amount::Seconds(seconds),
         (Some(steps), Some(seconds)) => {
             let found = format!("{seconds}, with refine_iterations {steps}");
-            return Err(bad_value(py, "refine_seconds", &found, "one of both"));
+            return Err(bad_value(py, "refine_seconds", &found, "only one of the two"));
         }
     };
     let options = RefineOptions { amount, hold_out, backend, ..RefineOptions::default() };
@@ -146,7 +146,7 @@ fn refinement(
     }
 }
 
-pub(crate) fn scene_of(
+pub(crate) fn read_scene(
     py: Python<'_>,
     images: &[Bound<'_, PyAny>],
     masks: Option<&[Bound<'_, PyAny>]>,
@@ -188,7 +188,7 @@ pub(crate) fn scene_of(
     Ok(Scene { views: views.collect::<PyResult<_>>()?, ..Scene::default() })
 }
 
-/// The picture, and the mask its alpha channel makes if it is transparent somewhere.
+/// The picture, and the mask from its alpha channel if it is transparent anywhere.
 pub(crate) fn picture(
     object: &Bound<'_, PyAny>,
     argument: &str,
@@ -224,7 +224,7 @@ pub(crate) fn mask(object: &Bound<'_, PyAny>, argument: &str, camera: &vg::Camer
     let py = object.py();
     let allowed = "a NumPy array of bool, or of uint8 where 128 and above is vehicle, or 1 of 0 and 1, (height, width); \
                    others become one by a comparison: mask > 0.5";
-    // Of one byte each, 0 or 1.
+    // One byte each, 0 or 1.
     let is_bool = object.cast::<PyUntypedArray>().is_ok_and(|a| numpy_is_bool(py, a));
     let labels: Vec<u8>;
     let bytes;
@@ -257,7 +257,7 @@ pub(crate) fn depth(object: &Bound<'_, PyAny>, argument: &str, camera: &vg::Came
         .map_err(|e| from_library(py, e))
 }
 
-/// A copy of the points; none if there are none.
+/// Copies the points; `None` if there are none.
 fn cloud(object: &Bound<'_, PyAny>) -> PyResult<Option<Cloud>> {
     let py = object.py();
     let points = floats(object, "cloud", "an array of floats, metres, (n, 3)")?;
@@ -279,7 +279,7 @@ fn same_size(py: Python<'_>, argument: &str, shape: &[usize], camera: &vg::Camer
     Err(bad_value(py, argument, &shape_text(shape), &allowed))
 }
 
-/// Something that is legal but looks like a mistake.
+/// Issues a warning about legal input that looks like a mistake.
 pub(crate) fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
     static WARN: PyOnceLock<Py<PyFunction>> = PyOnceLock::new();
     WARN.import(py, "vehicle_gaussians._warn", "warn")?.call1((text,))?;

@@ -1,16 +1,16 @@
-//! Gaussians that are there already, moved until their pictures are photographs.
+//! Optimisation of existing Gaussians against photographs.
 
 use crate::errors::{bad_value, detached, from_library};
 use crate::gaussians::Gaussians;
-use crate::reconstruct::scene_of;
+use crate::reconstruct::read_scene;
 use crate::renderer::chosen;
-use crate::watched::Teller;
+use crate::watched::ProgressFunction;
 use crate::whole;
 use pyo3::prelude::*;
 use vg::progress::Progress;
 use vg::refine::{Amount, Densify, RefineOptions};
 
-/// The Gaussians, and what was done as JSON.
+/// The Gaussians, and the report as JSON.
 #[pyfunction]
 #[pyo3(signature = (
     gaussians, images, masks, cameras, depths, names, iterations, seconds, hold_out, densify, backend, threads, progress
@@ -38,7 +38,7 @@ pub(crate) fn refine(
         (None, None) => RefineOptions::default().amount,
         (Some(steps), Some(seconds)) => {
             let found = format!("{seconds}, with iterations {steps}");
-            return Err(bad_value(py, "seconds", &found, "one of both"));
+            return Err(bad_value(py, "seconds", &found, "only one of the two"));
         }
     };
     let densify = densify.then(Densify::of_refinement);
@@ -50,20 +50,20 @@ pub(crate) fn refine(
         }
         other => other,
     };
-    // Before the pixels are copied.
+    // Checked before the pixels are copied.
     options.validate().map_err(|e| from_library(py, named(e)))?;
-    let scene = scene_of(py, &images, Some(&masks), &cameras, Some(&depths), Some(names))?;
+    let scene = read_scene(py, &images, Some(&masks), &cameras, Some(&depths), Some(names))?;
     let gaussians = &gaussians.get().inner;
-    let teller = Teller::new(progress)?;
+    let function = ProgressFunction::new(progress)?;
     let mut raised = None;
     let made = detached(py, || {
-        let mut tell = |state: Progress| teller.tell(state, &mut raised);
-        let (refined, done) = vg::refine::model(gaussians, &scene, &options, threads, &mut tell)?;
+        let mut report = |state: Progress| function.report(state, &mut raised);
+        let (refined, done) = vg::refine::model(gaussians, &scene, &options, threads, &mut report)?;
         Ok((refined, serde_json::to_string(&done).unwrap_or_default()))
     });
     if let Some(error) = raised {
         return Err(error);
     }
     let (refined, done) = made?;
-    Ok((Gaussians::of(refined), done))
+    Ok((Gaussians::new(refined), done))
 }

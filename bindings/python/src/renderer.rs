@@ -1,4 +1,4 @@
-//! `Renderer`: Gaussians made ready to be drawn many times, by the CPU or a graphics processor.
+//! `Renderer`: Gaussians prepared for rendering many times, on the CPU or a GPU.
 
 use crate::camera::Camera;
 use crate::errors::{bad_value, detached};
@@ -10,9 +10,9 @@ use pyo3::prelude::*;
 use std::sync::Arc;
 use vg::render::{AssetRenderer, Backend, Background, RenderOptions, Rgba8};
 
-/// Gaussians made ready to be drawn many times. backend is "auto", a graphics processor where this build and this
-/// machine have one and there are 20,000 Gaussians or more, else the CPU; "cpu"; or "gpu", an error without. Under
-/// "auto" the CPU goes on should the device fail.
+/// Gaussians prepared for rendering many times. backend is "auto", a GPU if this build and this machine have one
+/// and there are 20,000 Gaussians or more, else the CPU; "cpu"; or "gpu", an error if there is none. With "auto"
+/// the CPU takes over if the GPU fails.
 ///
 ///     >>> ready = Renderer(car, "cpu")
 ///     >>> pictures = [ready.render(camera) for camera in cameras]
@@ -32,19 +32,19 @@ impl Renderer {
         Ok(Self { ready: detached(py, || AssetRenderer::new(shared, backend))? })
     }
 
-    /// Who draws: "cpu" or "gpu".
+    /// The renderer that was chosen: "cpu" or "gpu".
     #[getter]
     fn backend(&self) -> &'static str {
         if self.ready.choice().backend == Backend::Gpu { "gpu" } else { "cpu" }
     }
 
-    /// Who draws, and why.
+    /// The renderer that was chosen, and why.
     #[getter]
     fn choice(&self) -> String {
         self.ready.choice().to_string()
     }
 
-    /// The picture a camera takes: uint8 (height, width, 3), or (height, width, 4) with straight alpha on a
+    /// Renders a camera's picture: uint8 (height, width, 3), or (height, width, 4) with straight alpha on a
     /// "transparent" background. Arguments are those of Gaussians.render.
     ///
     ///     >>> picture = Renderer(car).render(camera, "transparent")
@@ -72,8 +72,8 @@ impl Renderer {
         Ok(array(py, camera, &options, drawn.pixels))
     }
 
-    /// The pictures of several cameras, a list of what render gives. A graphics processor draws one while the picture
-    /// before it is copied. progress is as for reconstruct, with the one stage "render".
+    /// Renders the pictures of several cameras; returns a list of the results of render. A GPU draws a picture while
+    /// the previous one is copied. progress is as for reconstruct, with the single stage "render".
     ///
     ///     >>> pictures = Renderer(car).render_many(cameras)
     #[pyo3(signature = (
@@ -105,7 +105,7 @@ impl Renderer {
     }
 
     fn __reduce__(&self) -> PyResult<()> {
-        let way_out = "elsewhere a new one is made of its Gaussians: Renderer(gaussians, backend)";
+        let way_out = "another process must make a new one from the Gaussians: Renderer(gaussians, backend)";
         Err(stays_here("Renderer", "working memory of this process", way_out))
     }
 
@@ -139,7 +139,7 @@ fn array<'py>(
     }
 }
 
-/// Who is asked to draw, of an argument of this name.
+/// Parses a choice of renderer; `argument` names it in errors.
 pub(crate) fn chosen(py: Python<'_>, argument: &str, backend: &str) -> PyResult<Backend> {
     match backend {
         "auto" => Ok(Backend::Auto),

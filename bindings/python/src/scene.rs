@@ -1,4 +1,4 @@
-//! Scenes on disk to arrays.
+//! Reads scenes from disk into arrays.
 
 use crate::arrays::{owned, similarity};
 use crate::camera::Camera;
@@ -12,7 +12,7 @@ use vg::io::{self, SceneOptions};
 use vg::progress::Watch;
 use vg::scene::mask::Label;
 
-/// Images, masks, depths, cameras and names, a list each; `None` for a mask or a depth map that is not there.
+/// Images, masks, depths, cameras and names, a list each; `None` for a missing mask or depth map.
 type Lists<'py> = (
     Vec<Bound<'py, PyArray3<u8>>>,
     Vec<Option<Bound<'py, PyArray2<bool>>>>,

@@ -1,4 +1,4 @@
-//! Long calls: they end at Ctrl-C, and tell the caller's function how far they are.
+//! Long calls, which end at Ctrl-C and report their progress to the caller's function.
 
 use crate::errors::detached;
 use pyo3::prelude::*;
@@ -7,22 +7,23 @@ use pyo3::types::PyFunction;
 use std::ops::ControlFlow;
 use vg::progress::{Progress, Threads, Watch};
 
-/// The caller's function, as `vehicle_gaussians._progress` asks it; `None` where there is none.
-pub(crate) struct Teller(Option<Py<PyAny>>);
+/// The caller's progress function, wrapped by `vehicle_gaussians._progress`; `None` if there is none.
+pub(crate) struct ProgressFunction(Option<Py<PyAny>>);
 
-impl Teller {
+impl ProgressFunction {
     pub(crate) fn new(progress: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
-        static TELLER: PyOnceLock<Py<PyFunction>> = PyOnceLock::new();
-        let told = progress.map(|function| {
-            let teller = TELLER.import(function.py(), "vehicle_gaussians._progress", "teller")?;
-            teller.call1((function,)).map(Bound::unbind)
+        static WRAP: PyOnceLock<Py<PyFunction>> = PyOnceLock::new();
+        let function = progress.map(|function| {
+            let wrap = WRAP.import(function.py(), "vehicle_gaussians._progress", "wrapped")?;
+            wrap.call1((function,)).map(Bound::unbind)
         });
-        Ok(Self(told.transpose()?))
+        Ok(Self(function.transpose()?))
     }
 
-    /// Whether to go on. What the caller's function or a signal handler raises is kept in `raised`, and the end.
-    pub(crate) fn tell(&self, state: Progress, raised: &mut Option<PyErr>) -> ControlFlow<()> {
-        match Python::attach(|py| self.goes_on(py, state)) {
+    /// Reports progress and returns whether to go on. An exception of the function or of a signal handler is stored in
+    /// `raised` and ends the call.
+    pub(crate) fn report(&self, state: Progress, raised: &mut Option<PyErr>) -> ControlFlow<()> {
+        match Python::attach(|py| self.continues(py, state)) {
             Ok(true) => ControlFlow::Continue(()),
             Ok(false) => ControlFlow::Break(()),
             Err(error) => {
@@ -32,17 +33,19 @@ impl Teller {
         }
     }
 
-    fn goes_on(&self, py: Python<'_>, state: Progress) -> PyResult<bool> {
+    fn continues(&self, py: Python<'_>, state: Progress) -> PyResult<bool> {
         py.check_signals()?;
         match &self.0 {
             None => Ok(true),
-            Some(teller) => teller.bind(py).call1((state.stage, state.fraction, state.overall))?.is_truthy(),
+            Some(function) => {
+                function.bind(py).call1((state.stage, state.fraction, state.overall))?.is_truthy()
+            }
         }
     }
 }
 
-/// Runs `work` without the GIL, with `threads` worker threads that end with it; 0 means one per core. This thread tells
-/// `progress` of it and listens for signals.
+/// Runs `work` without the GIL, with `threads` worker threads that end with it; 0 means one per core. The calling
+/// thread reports to `progress` and checks for signals.
 pub(crate) fn watched<T: Send>(
     py: Python<'_>,
     threads: usize,
@@ -50,11 +53,11 @@ pub(crate) fn watched<T: Send>(
     progress: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&Watch) -> vg::Result<T> + Send,
 ) -> PyResult<T> {
-    let teller = Teller::new(progress)?;
+    let function = ProgressFunction::new(progress)?;
     let mut raised = None;
     let made = detached(py, || {
-        let mut tell = |state: Progress| teller.tell(state, &mut raised);
-        Threads::new(threads)?.run_watched(stage, &mut tell, work)
+        let mut report = |state: Progress| function.report(state, &mut raised);
+        Threads::new(threads)?.run_watched(stage, &mut report, work)
     });
     raised.map_or(made, Err)
 }

@@ -1,4 +1,4 @@
-//! Whole numbers among the arguments: one that is negative or too large is an error that names it.
+//! Checks of whole-number arguments; an error names the argument that is negative or too large.
 
 use crate::errors::{bad_type, bad_value};
 use pyo3::prelude::*;
@@ -33,7 +33,7 @@ pub(crate) fn y(object: &Bound<'_, PyAny>) -> PyResult<u32> {
     whole(object, "y", "a row of the picture, 0 or above")
 }
 
-/// How many cameras of a turntable.
+/// Number of cameras of a turntable.
 pub(crate) fn count(object: &Bound<'_, PyAny>) -> PyResult<usize> {
     whole(object, "count", "1 to 100000")
 }

@@ -1,4 +1,4 @@
-"""What the tests share: the bundled sample, and an ellipsoid seen by four cameras whose every pixel is known."""
+"""Shared fixtures: the bundled sample, and an ellipsoid seen by four cameras whose every pixel is known."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def on_white(image: npt.NDArray[np.uint8], mask: npt.NDArray[np.bool_] | None) -
 
 
 def psnr(a: npt.NDArray[np.uint8], b: npt.NDArray[np.uint8]) -> float:
-    """dB, full frame."""
+    """PSNR over the full frame, dB."""
     assert a.shape == b.shape and a.dtype == b.dtype == np.uint8
     error = np.mean((a.astype(float) - b.astype(float)) ** 2)
     return float(10 * np.log10(255.0**2 / error)) if error > 0 else math.inf

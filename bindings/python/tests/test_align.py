@@ -1,4 +1,4 @@
-"""Alignment: by either face the same numbers, close to what is known, and words for what cannot be aligned."""
+"""Alignment: both interfaces give equal numbers, close to the truth, and errors for input that cannot be aligned."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def whole() -> vg.Scene:
 
 @pytest.fixture(scope="module")
 def scan(whole: vg.Scene) -> npt.NDArray[np.float32]:
-    """What the depth maps of the right side show of the vehicle, in its frame, and its mirror image."""
+    """Points of the vehicle from the depth maps of the right side, in its frame, and their mirror images."""
     points = []
     for depth, mask, camera in zip(whole.depths, whole.masks, whole.cameras, strict=True):
         assert mask is not None
@@ -45,7 +45,7 @@ def scan(whole: vg.Scene) -> npt.NDArray[np.float32]:
 
 
 def in_world(cameras: list[vg.Camera]) -> list[vg.Camera]:
-    """The same cameras in a world of another gauge."""
+    """The cameras in a world of another gauge."""
     rotation = WORLD_FROM_VEHICLE[:3, :3] / 0.5
     moved = []
     for camera in cameras:
@@ -70,7 +70,7 @@ def write_ply(path: Path, points: npt.NDArray[np.float32]) -> Path:
 def test_a_scan_tells_the_gauge_by_either_face(whole: vg.Scene, scan: npt.NDArray[np.float32]) -> None:
     arguments = (whole.masks, in_world(whole.cameras), scan)
     found = [face.align_scan(*arguments, names=whole.names) for face in FACES]
-    # A pose that is handed over as a matrix once more is made a rotation once more.
+    # A pose that is passed as a matrix again is orthonormalised again.
     matrices = [one.vehicle_from_world for one in found]
     assert np.allclose(*matrices, rtol=0, atol=1e-12) and found[0][1:7] == pytest.approx(found[1][1:7], rel=1e-9)
     error = found[0].vehicle_from_world @ WORLD_FROM_VEHICLE - np.eye(4)

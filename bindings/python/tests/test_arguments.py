@@ -1,4 +1,4 @@
-"""Errors are Python's own by either face, and name the argument; what is unambiguous is taken."""
+"""Errors are Python's own in both interfaces, and name the argument; unambiguous values are accepted."""
 
 from __future__ import annotations
 
@@ -208,7 +208,7 @@ def test_floats_of_any_precision_are_what_they_are_rounded_to(
     arrays = [getattr(g, name) for name in ("means", "scales", "quats", "opacities", "sh")]
     of_doubles = face.Gaussians.from_arrays(*(array.astype(np.float64) for array in arrays))
     assert same_bytes(of_doubles, face.Gaussians.from_arrays(*arrays))
-    # A list has no unit of a file's: its whole numbers are taken.
+    # Whole numbers in a list are accepted, because they do not come from a file in another unit.
     listed = face.Gaussians.from_arrays([[0, 0, 1]], [[1, 1, 1]], [[1, 0, 0, 0]], [1], [[[0, 0, 0]]])
     assert len(listed) == 1
     cloud = np.ascontiguousarray(g.means[::50])

@@ -1,4 +1,4 @@
-"""Cameras and poses; pycolmap is the other opinion."""
+"""Cameras and poses, compared with pycolmap."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_opencvs_principal_point_moves_by_half_a_pixel() -> None:
     camera = vg.Camera.from_opencv(K, POSE, 640, 480)
     np.testing.assert_array_equal(camera.K[:2, 2], [320, 240])
     assert camera == vg.Camera.from_matrix(camera.K, POSE, 640, 480)
-    # As cv2.calibrateCamera hands them out.
+    # As cv2.calibrateCamera returns them.
     bent = vg.Camera.from_opencv(K, POSE, 640, 480, np.array([[0.1, 0.2, 0.3, 0.4, 0.5]]))
     np.testing.assert_array_equal(bent.params, [600, 610, 320, 240, 0.1, 0.2, 0.3, 0.4, 0.5, 0, 0, 0])
     fisheye = vg.Camera.from_opencv(K, POSE, 640, 480, [[0.1], [0.2], [0.3], [0.4]], fisheye=True)

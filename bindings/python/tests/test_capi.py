@@ -1,4 +1,4 @@
-"""The C interface through ctypes, held to the header by a C compiler and to the extension module by its bytes."""
+"""The C interface through ctypes, compared with the header by a C compiler, and byte for byte with the module."""
 
 from __future__ import annotations
 
@@ -117,10 +117,10 @@ def test_ctypes_and_the_extension_module_give_the_same_bytes(depth: bool, sedan:
         assert (a.shape, a.dtype) == (b.shape, b.dtype) and a.tobytes() == b.tobytes()
 
     def without_times(report: dict[str, Any]) -> dict[str, Any]:
-        # The number of threads is a setting here and the context's there.
+        # The number of threads is a setting in the extension module and belongs to the context in C.
         settings = {k: v for k, v in report["settings"].items() if k != "threads"}
         changing = ("stages", "total_ms", "peak_rss_bytes", "settings")
-        # Poses pass the C face as matrices, which are made orthonormal once more: the last digit may differ.
+        # Poses are passed to C as matrices, which are orthonormalised again: the last digit may differ.
         for view in report["calibration"]["views"]:
             view["vehicle_from_camera"] = [round(v, 12) for v in view["vehicle_from_camera"]]
         return {**settings, **{k: v for k, v in report.items() if k not in changing}}
@@ -164,9 +164,9 @@ def test_options_are_those_of_the_extension_module(ellipsoid: Views, made: vg.Re
     assert refinement == theirs.report["refinement"] and refinement["iterations"] == 3
     assert refinement["held_out"]["view"] == "001"
     assert refinement["drawn_by"].startswith("cpu (") and refinement["drawn_by"].endswith("): asked for")
-    # The settings are what a budget chose; the budget itself is in the plan.
+    # The settings are those that the budget chose; the budget itself is in the plan.
     assert ours.report["plan"]["budget_s"] == theirs.report["plan"]["budget_s"] == given["budget"]
-    # Another order in memory is copied; no points are no cloud.
+    # An array in another memory order is copied; an empty array is no cloud.
     given["cloud"] = np.asfortranarray(cloud)
     assert same_bytes(capi.reconstruct(*views, **given).gaussians, ours.gaussians)
     given["cloud"] = cloud[:0]
@@ -326,7 +326,7 @@ def test_progress_cancels_logs_and_passes_exceptions_through(ellipsoid: Views) -
 
 
 def test_ctrl_c_stops_a_reconstruction_through_ctypes() -> None:
-    # A shell that starts its jobs in the background has them ignore Ctrl-C.
+    # A shell makes its background jobs ignore Ctrl-C.
     code = f"""
 import signal
 from vehicle_gaussians import capi
@@ -475,7 +475,7 @@ def import_with(library: str | Path) -> str:
 
 def test_a_library_that_is_missing_or_none_or_of_another_abi_is_an_import_error_with_hints(tmp_path: Path) -> None:
     said = import_with("/no/such/libvg.so")
-    assert said.startswith("ImportError: /no/such/libvg.so: there is no such library. VG_LIBRARY names it. Hints: ")
+    assert said.startswith("ImportError: /no/such/libvg.so: no such file. It is set by VG_LIBRARY. Hints: ")
     (tmp_path / "text.so").write_text("not a library")
     assert "cannot be loaded" in import_with(tmp_path / "text.so")
     compiler = shutil.which("cc")

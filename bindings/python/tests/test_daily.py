@@ -1,4 +1,4 @@
-"""What daily work needs: cameras placed by hand, points to pixels, parts of Gaussians, refinement, tables, reports."""
+"""Daily work: cameras placed by hand, points to pixels, parts of Gaussians, refinement, tables, reports."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_points_go_to_pixels_and_back_through_any_lens(made: vg.Reconstruction) 
         assert pixels.shape == (len(points), 2) and depths.shape == (len(points),)
         assert camera.project(points).tobytes() == pixels.tobytes()
         assert camera.unproject(pixels, depths) == pytest.approx(points, abs=1e-7)
-    # By hand, without a lens.
+    # Computed by hand, without distortion.
     camera = vg.Camera.from_opencv(K, pose, 640, 480)
     seen = (points - pose[:3, 3]) @ pose[:3, :3]
     assert camera.project(points) == pytest.approx(seen[:, :2] / seen[:, 2:] * [600, 610] + [320, 240])
@@ -138,7 +138,7 @@ def test_indices_of_numpy_select_what_they_select_of_arrays(made: vg.Reconstruct
     ]:
         with pytest.raises(vg.VgError, match=words):
             car[index]
-    # No sequence: NumPy does not take it for nested lists.
+    # Not a sequence: NumPy does not convert it as nested lists.
     assert np.asarray(car, dtype=object).shape == ()
 
 
@@ -239,7 +239,7 @@ def test_the_committed_schema_is_that_of_the_typed_report_and_holds_real_reports
     assert typed.stages[0].name == "plan" and typed.gaussians == len(sedan_made.gaussians)
     assert vg.Report.of(others[0].report).refinement.held_out.view == "002"  # type: ignore[union-attr]
     assert vg.Report.of(with_budget.report).plan.fits is False  # type: ignore[union-attr]
-    # A newer library may say more.
+    # A newer library may have more fields.
     assert vg.Report.of({**sedan_made.report, "new": 1}) == typed
 
 
@@ -261,7 +261,7 @@ def test_cameras_and_pixels_of_the_ctypes_face_are_those_of_the_extension(made: 
     assert np.array(ours.vehicle_from_camera).reshape(3, 4).tolist() == theirs.vehicle_from_camera[:3].tolist()
     points = made.gaussians.means.astype(float)
     pixels, depths = capi.project(ours, points, depth=True)
-    # A pose that is handed over is made orthonormal once more, which moves its last bits.
+    # A pose that is passed in is orthonormalised again, which changes its last bits.
     for found in (pixels, capi.project(theirs, points)):
         assert found == pytest.approx(theirs.project(points), abs=1e-9)
     assert capi.unproject(ours, pixels, depths) == pytest.approx(theirs.unproject(pixels, depths), abs=1e-9)

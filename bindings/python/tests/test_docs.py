@@ -1,7 +1,7 @@
-"""Docstrings: every public call has an example, which runs; and editors read in the stub what ``help`` prints.
+"""Docstrings: every public call has an example, which runs; the stub has the docstrings that ``help`` prints.
 
-``VG_BLESS=1 python -m pytest bindings/python/tests/test_docs.py`` writes the docstrings of the extension module, which
-are those of its Rust sources, into the stub.
+``VG_BLESS=1 python -m pytest bindings/python/tests/test_docs.py`` copies the docstrings of the extension module, which
+come from its Rust sources, into the stub.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from vehicle_gaussians import capi
 
 STUB = REPOSITORY / "bindings" / "python" / "python" / "vehicle_gaussians" / "_native.pyi"
 NATIVE = [name for name in vg.__all__ if getattr(vg, name) is getattr(vg._native, name, None) and name[0] != "_"]
-#: Tuples of results, for which editors show the fields.
+#: Named tuples of results, whose fields have docstrings.
 RESULTS = [
     vg.Alignment,
     vg.Gradients,
@@ -48,7 +48,7 @@ def members(thing: Any) -> Iterator[tuple[str, Any]]:
 
 
 def calls() -> Iterator[tuple[str, Any]]:
-    """What users call: functions, classes of the extension module and their methods."""
+    """The public calls: functions, classes of the extension module and their methods."""
     for name in vg.__all__:
         thing = getattr(vg, name)
         if inspect.isroutine(thing) or name in NATIVE:
@@ -102,12 +102,12 @@ def test_the_examples_run(
     }
     modules = [("vehicle_gaussians", vg), ("vehicle_gaussians.capi", capi)]
     documented = [*calls(), *modules, ("VgError", vg.VgError), ("Report", vg.Report)]
-    said: list[str] = []
+    failures: list[str] = []
     ran = 0
     for name, thing in documented:
         test = doctest.DocTestParser().get_doctest(inspect.getdoc(thing) or "", dict(names), name, None, None)
-        ran += doctest.DocTestRunner().run(test, out=said.append).attempted
-    assert not said, "".join(said)
+        ran += doctest.DocTestRunner().run(test, out=failures.append).attempted
+    assert not failures, "".join(failures)
     assert ran > 40
 
 
@@ -127,7 +127,7 @@ def test_the_stub_has_the_docstrings_of_the_module() -> None:
 
 
 def with_docstrings(stub: str) -> str:
-    """The stub with the docstrings of what is public, of several overloads at the first."""
+    """The stub with the docstrings of public members; of several overloads, the first has it."""
     edits: list[tuple[Any, str]] = []
     for node in ast.parse(stub).body:
         name = getattr(node, "name", "")
@@ -140,16 +140,16 @@ def with_docstrings(stub: str) -> str:
                 seen.add(member.name)
                 edits.append((member, inspect.getdoc(getattr(getattr(vg, name), member.name)) or ""))
     lines = stub.split("\n")
-    # From the end, so that the lines before stay where they are.
+    # From the end, so that earlier line numbers stay valid.
     for node, text in sorted(edits, key=lambda edit: -int(edit[0].lineno)):
-        first, said = node.body[0], docstring(text, node.col_offset + 4)
+        first, new = node.body[0], docstring(text, node.col_offset + 4)
         if isinstance(first, ast.Expr) and isinstance(getattr(first.value, "value", None), str):
-            lines[first.lineno - 1 : first.end_lineno] = said
+            lines[first.lineno - 1 : first.end_lineno] = new
         elif isinstance(node, ast.ClassDef):
-            lines[node.lineno : node.lineno] = said
+            lines[node.lineno : node.lineno] = new
         else:
             head = lines[first.lineno - 1][: first.col_offset].rstrip()
-            lines[first.lineno - 1 : first.end_lineno] = [head, *said]
+            lines[first.lineno - 1 : first.end_lineno] = [head, *new]
     return "\n".join(lines)
 
 

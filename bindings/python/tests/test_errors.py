@@ -1,4 +1,4 @@
-"""Errors say argument, found, allowed."""
+"""Error messages: the argument, what was found, what is allowed."""
 
 from __future__ import annotations
 
@@ -121,7 +121,10 @@ OPTIONS: list[tuple[dict[str, Any], str]] = [
     ({"refine_iterations": 0}, "refine_iterations: 0; allowed: 1 to 1000000"),
     ({"refine_iterations": 1_000_001}, "refine_iterations: 1000001; allowed: at most 1000000"),
     ({"refine_seconds": -1.0}, "refine_seconds: -1; allowed: above 0, at most 86400"),
-    ({"refine_seconds": 1.0, "refine_iterations": 5}, "refine_seconds: 1, with refine_iterations 5; allowed: one of both"),
+    (
+        {"refine_seconds": 1.0, "refine_iterations": 5},
+        "refine_seconds: 1, with refine_iterations 5; allowed: only one of the two",
+    ),
     ({"cloud": np.zeros((4, 2), np.float32)}, "cloud: shape (4, 2); allowed: (n, 3)"),
     ({"cloud": np.zeros(3, np.float32)}, "cloud: shape (3,); allowed: (n, 3)"),
     ({"cloud": np.array([[0, 0, 0], [0, np.inf, 0]], np.float32)}, "cloud[1]: [0.0, inf, 0.0]; allowed: finite"),

@@ -1,4 +1,4 @@
-"""The examples run as written, and what they leave looks like the vehicle."""
+"""The examples run as written, and their results look like the vehicle."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_quickstart_draws_the_side_nobody_photographed(tmp_path: Path, sedan: vg
     said = run("quickstart.py", cwd=tmp_path)
     assert "from 4 photographs" in said
     assert unseen_psnr(tmp_path / "car.ply", unseen) > 24.0
-    # The sample is its own mirror image: mirrored, the picture of the other side is the photograph of this one.
+    # The sample is symmetric: the mirrored picture of the other side is the photograph of this side.
     picture = np.asarray(Image.open(tmp_path / "unseen.png").convert("RGB"))
     assert psnr(np.ascontiguousarray(picture[:, ::-1]), on_white(sedan.images[0], sedan.masks[0])) > 20
     figure = np.asarray(Image.open(tmp_path / "quickstart.png").convert("RGB"))

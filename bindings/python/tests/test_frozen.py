@@ -1,4 +1,4 @@
-"""Arrays of Gaussians cannot be written, whoever asks for their memory."""
+"""Arrays of Gaussians cannot be written through any protocol."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def gaussians(request: pytest.FixtureRequest) -> Any:
 
 
 class OldReader:
-    """Asks as readers of DLPack before 1.0 do: without a version."""
+    """Requests the array without a version, as consumers of DLPack before 1.0 do."""
 
     def __init__(self, array: Any) -> None:
         self.array = array
@@ -87,7 +87,7 @@ def test_what_is_made_of_them_is_an_ordinary_array(gaussians: Any) -> None:
         assert type(array) is np.ndarray and array.flags.writeable
     assert type(pickle.loads(pickle.dumps(means))) is np.ndarray
     assert isinstance(means.max(), np.float32) and isinstance(means[0, 0], np.float32)
-    # Of what is no longer the library's memory nothing is copied.
+    # Arrays that no longer point to the library's memory are not copied.
     changed = means.copy()
     assert np.shares_memory(np.from_dlpack(changed), changed)
 

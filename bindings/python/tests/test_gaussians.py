@@ -55,7 +55,7 @@ def test_an_array_outlives_the_object_it_came_from(ellipsoid: Views) -> None:
     assert sys.getrefcount(owner) > len(ARRAYS)
     del made, owner
     gc.collect()
-    # Whoever freed the memory would see it used again.
+    # Memory that was freed by mistake would be reused here.
     junk = [np.full_like(copy, 7.0) for copy in copies.values() for _ in range(4)]
     for name, view in views.items():
         np.testing.assert_array_equal(view, copies[name])
@@ -171,7 +171,7 @@ def test_backgrounds(made: vg.Reconstruction, ellipsoid: Views) -> None:
     clear = render(camera, "transparent")
     assert clear.shape == (72, 96, 4) and clear[0, 0, 3] == 0
     assert clear[36, 48, 3] > 250
-    # Straight alpha: put on white, it is the picture on white, to the rounding of 8 bits.
+    # Straight alpha: composited on white, it is the picture on white, to the rounding of 8 bits.
     alpha = clear[..., 3:] / 255
     on_white = clear[..., :3] * alpha + 255 * (1 - alpha)
     assert np.abs(on_white - render(camera)).max() <= 1.5
@@ -219,7 +219,7 @@ def test_render_options_change_the_picture(made: vg.Reconstruction, ellipsoid: V
 
 def test_a_lens_bends_the_picture(made: vg.Reconstruction, ellipsoid: Views) -> None:
     pinhole = ellipsoid.cameras[0]
-    # Barrel distortion shrinks what is off the centre: the silhouette covers fewer pixels.
+    # Barrel distortion shrinks off-centre parts, so the silhouette covers fewer pixels.
     bent = vg.Camera.from_matrix(pinhole.K, pinhole.vehicle_from_camera, 96, 72, distortion=[-0.8, 0.3, 0, 0])
     areas = [int((made.gaussians.render(c) != 255).any(axis=2).sum()) for c in (pinhole, bent)]
     assert 0.5 < areas[1] / areas[0] < 0.99
@@ -244,6 +244,6 @@ def test_a_renderer_draws_the_same_and_says_who_did(made: vg.Reconstruction, ell
 
 
 def raise_unless_gpu(gaussians: vg.Gaussians) -> None:
-    """Drawing on a graphics processor, or the error that says why not."""
+    """Renders on a GPU, or returns the error that says why it cannot."""
     if vg.Renderer(gaussians, "gpu").backend == "gpu":
         raise vg.VgError(vg.Status.MISSING, "graphics processor: there is one")

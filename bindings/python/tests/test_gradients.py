@@ -1,4 +1,4 @@
-"""The way back: gradients by both faces."""
+"""Gradients in both interfaces."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_both_faces_give_the_same_bytes(
         if mine.dtype == np.float32:
             assert mine.tobytes() == other.tobytes(), name
         else:
-            # The camera came as a matrix, whose rotation is a quaternion again: the last bits of doubles.
+            # The camera is passed as a matrix and converted to a quaternion again: the last bits may differ.
             np.testing.assert_allclose(mine, other, rtol=1e-11, atol=1e-11 * np.abs(mine).max(), err_msg=name)
         assert np.isfinite(mine).all() and (mine.any() or (name, background) == ("background", "transparent")), name
     for name in ("means", "scales", "quats", "opacities", "sh"):
@@ -77,7 +77,7 @@ def test_planes_are_the_picture(made: vg.Reconstruction, ellipsoid: Views) -> No
 
 
 def test_gradients_tell_how_the_loss_changes(arrays: Any, camera: vg.Camera, planes: vg.Planes) -> None:
-    # Of what enters linearly: exact but for rounding. Clamped colours make sh no such thing.
+    # Inputs that enter linearly: exact except for rounding. Clamped colours make sh non-linear.
     g = vg.Gaussians.from_arrays(*arrays)
     made = g.render_backward(camera, *planes)
 
@@ -131,7 +131,7 @@ def test_bad_planes_are_named(face: Any, arrays: Any, camera: vg.Camera, planes:
     for call in (g.render_planes, lambda c, **o: g.render_backward(c, alpha=planes.alpha, **o)):
         with pytest.raises(vg.VgError, match="^backend: .cuda.; allowed: auto, cpu, gpu"):
             call(camera, backend="cuda")
-        # A wheel without graphics processors says so.
+        # A wheel without GPU support raises an error.
         with pytest.raises(vg.VgError, match="backend: gpu is not in this build"):
             call(camera, backend="gpu")
     for name in ("color", "alpha", "depth"):

@@ -1,4 +1,4 @@
-"""Measures: by either face the same numbers, None where there is none, and words for what cannot be measured."""
+"""Measures: equal numbers in both interfaces, None where undefined, and errors for input that cannot be measured."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_pictures_are_measured_as_the_formulas_say(face: Any, ellipsoid: Views) 
     assert face.picture_errors(a[:10], b[:10]).ssim is None
     floats = [(p / 255.0).astype(np.float32) for p in (a, b)]
     assert face.picture_errors(*floats) == pytest.approx(errors[:2] + (None,), abs=1e-6)
-    # Half of nothing and half of black, on white.
+    # One half transparent, one half black, on white.
     gray = np.full((*a.shape[:2], 3), 128, np.uint8)
     black = np.zeros((*a.shape[:2], 4), np.uint8)
     black[..., 3] = 127

@@ -1,4 +1,4 @@
-"""Networks: what a package without ONNX Runtime answers, and what is wrong whatever it was built with."""
+"""Networks: errors of a package without ONNX Runtime, and errors that are the same in every build."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def refusal(face: Any, *arguments: Any, **named: Any) -> vg.VgError:
 
 
 def is_built(face: Any) -> bool:
-    """Whether this package was built with networks: then the missing file is what is told."""
+    """Whether this package was built with networks; the error is then about the missing file."""
     return refusal(face, "/nowhere/at/all.onnx").code is Status.IO
 
 

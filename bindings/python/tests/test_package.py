@@ -1,4 +1,4 @@
-"""The package itself: versions, what the wheel holds, types."""
+"""The package itself: versions, contents of the wheel, types."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_a_build_without_rust_says_what_to_install(hook: str, tmp_path: Path) ->
 
 @pytest.mark.skipif(sys.platform != "linux", reason="sonames are ELF's")
 def test_only_the_c_library_is_called_libvg() -> None:
-    # A program in the same process that needs libvg.so.0 would be given the extension module instead.
+    # Otherwise the loader would give the extension module to a program in the same process that needs libvg.so.0.
     native = Path(vg._native.__file__).read_bytes()
     assert b"libvg.so.0" not in native and b"libvg.so.0" in capi.library_path().read_bytes()
 

@@ -1,4 +1,4 @@
-"""Pickle and copy: what holds values comes back to the last bit, what belongs to its process says so; equality."""
+"""Pickle and copy: values are restored bit for bit, objects that belong to a process raise an error; equality."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def some_gaussians(face: Any, seed: int = 1, n: int = 500) -> Any:
 
 
 def bent_cameras() -> list[vg.Camera]:
-    """Every kind of lens, at places whose rotations have last bits that making them orthonormal again would move."""
+    """Every kind of lens, at poses whose last bits would change if they were orthonormalised again."""
     random = np.random.default_rng(7)
     K = [[600, 0, 320.1], [0, 610, 1 / 3], [0, 0, 1]]
     lenses: list[Any] = [None, [0, 0, 0, 0], [0.1, -0.2, 1e-3, 2e-3], [0.1, -0.2, 1e-3, 2e-3, 0.3]]
@@ -57,7 +57,7 @@ def test_gaussians_come_back_to_the_last_bit_and_live_on(face: Any, way: str) ->
     again = WAYS[way](original)
     del original
     gc.collect()
-    # Whoever had a freed handle would see its memory used again.
+    # The memory of a handle that was freed by mistake would be reused here.
     junk = [some_gaussians(face, seed) for seed in range(4)]
     assert type(again) is face.Gaussians and same_bytes(again, expected) and len(junk) == 4
     assert again.mirrored() == expected.mirrored()
@@ -76,7 +76,7 @@ def test_cameras_come_back_equal(way: str) -> None:
 
 
 def things(face: Any, ellipsoid: Views) -> dict[str, Any]:
-    """What users hold that is not a handle."""
+    """Objects of users that are not handles."""
     views = (ellipsoid.images, ellipsoid.masks, ellipsoid.cameras)
     made = face.reconstruct(*views, ellipsoid.depths, points=True)
     world = np.random.default_rng(2).normal(size=(8, 3))
@@ -112,7 +112,7 @@ def test_scenes_results_and_measures_come_back_equal_here_and_from_a_spawned_pro
 def test_what_belongs_to_its_process_is_refused_with_the_way_out(face: Any) -> None:
     refused = [(face.Renderer(some_gaussians(face), "cpu"), r"Renderer\(gaussians, backend\)")]
     if face is capi:
-        # Without a file there is no open one; what is refused does not look.
+        # No file is needed: the refusal does not read the model.
         refused += [(capi.Context(1), r"Context\(threads\)"), (capi.Model.__new__(capi.Model), r"Model\(path\)")]
     for thing, way_out in refused:
         for way in WAYS.values():
@@ -120,7 +120,7 @@ def test_what_belongs_to_its_process_is_refused_with_the_way_out(face: Any) -> N
                 way(thing)
         with pytest.raises(TypeError, match="cannot be pickled or copied"):
             pickle.dumps({"held": [thing]})
-    # A package without networks opens no model that could be refused here.
+    # A package without networks cannot open a model to test this with.
     assert "__reduce__" in vars(vg.Model) and "__reduce__" in vars(vg.Renderer)
 
 

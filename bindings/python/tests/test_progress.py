@@ -1,4 +1,4 @@
-"""What progress functions are told and what their answers do; Ctrl-C in long calls."""
+"""Arguments and return values of progress functions; Ctrl-C in long calls."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_the_overall_fraction_grows_from_0_to_1_through_all_stages(face: Any, el
     assert list(dict.fromkeys(state[0] for state in told)) == [*STAGES[:-1], "refine", "check"]
     assert overall == sorted(overall) and overall[0] == 0.0
     assert told[-1] == ("check", 1.0, 1.0)
-    # Of what takes time, no stage is next to nothing or next to all.
+    # No stage that takes time is nearly nothing or nearly all of the whole.
     assert len({round(part, 2) for part in overall}) > 8
 
 
@@ -84,7 +84,7 @@ def test_a_third_parameter_with_a_default_is_the_callers_own(face: Any, ellipsoi
 
 
 class Mine(Exception):
-    """What a progress function raises."""
+    """An exception of a progress function."""
 
 
 def fail_at(part: float) -> Callable[[str, float], None]:
@@ -96,7 +96,7 @@ def fail_at(part: float) -> Callable[[str, float], None]:
 
 
 def drawn(face: Any, gaussians: vg.Gaussians, cameras: list[vg.Camera], progress: Any) -> list[npt.NDArray[np.uint8]]:
-    """Of vehicle_gaussians.Renderer and of capi.Renderer."""
+    """Interface of vehicle_gaussians.Renderer and of capi.Renderer."""
     if face is vg:
         return vg.Renderer(gaussians, "cpu").render_many(cameras, progress=progress)
     arrays = (getattr(gaussians, name) for name in ("means", "scales", "quats", "opacities", "sh"))
@@ -138,7 +138,7 @@ def aligned(face: Any, ellipsoid: Views, made: vg.Reconstruction, times: int, pr
 
 
 def haze(count: int) -> vg.Gaussians:
-    """Gaussians that cover all of a picture and end no pixel: each has to be blended into every one."""
+    """Gaussians that cover the whole picture without saturating a pixel: all are blended into every pixel."""
     depth = np.linspace(0.0, 1.0, count, dtype=np.float32)
     means = np.stack([depth, 0 * depth, 0 * depth], axis=1)
     quats = np.tile(np.array([1, 0, 0, 0], np.float32), (count, 1))
@@ -153,7 +153,7 @@ def haze(count: int) -> vg.Gaussians:
 
 @contextmanager
 def ctrl_c_after(seconds: float) -> Iterator[list[float]]:
-    """Interrupts this process, and tells when."""
+    """Interrupts this process and records the time."""
     pressed: list[float] = []
 
     def press() -> None:
@@ -170,7 +170,7 @@ def ctrl_c_after(seconds: float) -> Iterator[list[float]]:
         signal.signal(signal.SIGINT, usual)
 
 
-#: Each would take minutes.
+#: Calls that would each take minutes.
 LONG_CALLS = [
     "render",
     "render_planes",

@@ -1,4 +1,4 @@
-"""Photographs in memory to Gaussians."""
+"""Reconstruction from photographs in memory."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_masks_may_be_bool_or_bytes_or_the_alpha_channel(ellipsoid: Views, made:
     for masks in (None, [None] * 4):
         from_alpha = vg.reconstruct(cut_out, masks, ellipsoid.cameras, ellipsoid.depths)
         assert same_bytes(from_alpha.gaussians, made.gaussians)
-    # A given mask comes before the alpha channel.
+    # A given mask takes precedence over the alpha channel.
     everything = [np.ones_like(mask) for mask in ellipsoid.masks]
     masked = vg.reconstruct(cut_out, everything, ellipsoid.cameras, ellipsoid.depths, symmetry="never")
     plain = vg.reconstruct(ellipsoid.images, everything, ellipsoid.cameras, ellipsoid.depths, symmetry="never")
@@ -175,7 +175,7 @@ def test_a_box_may_bring_its_place_by_either_face(face: Any, ellipsoid: Views) -
     made = face.reconstruct(*views, prior="hull", check=False, vehicle_size=(4.4, 1.8, 1.4), vehicle_place=(0, 0, 0, 0))
     vehicle = made.report["vehicle"]
     for found, true, error in zip(vehicle["size_m"], (4.4, 1.8, 1.4), vehicle["uncertainty_m"], strict=True):
-        # One view alone.
+        # A single view.
         assert abs(found - true) < 3 * error
     with pytest.raises(vg.VgError, match="yaw.*radians"):
         face.reconstruct(*views, vehicle_size=(4.4, 1.8, 1.4), vehicle_place=(0, 0, 0, 90))
@@ -193,11 +193,11 @@ def test_a_cloud_in_the_vehicle_frame_pulls_the_surface_to_it(ellipsoid: Views) 
     fit = made.report["cloud"]
     assert fit["used"] + fit["outside"] <= len(cloud) and fit["used"] > 0.9 * len(cloud)
     assert fit["after_m"] <= fit["before_m"]
-    # Any layout; the caller's array stays.
+    # Any layout; the caller's array is not changed.
     before = cloud.copy()
     again = vg.reconstruct(*views, prior="hull", cloud=np.asfortranarray(cloud), check=False)
     assert same_bytes(made.gaussians, again.gaussians) and (cloud == before).all()
-    # No points are no cloud.
+    # An empty array is no cloud.
     for none in (None, np.zeros((0, 3), np.float32)):
         assert vg.reconstruct(*views, prior="hull", cloud=none, check=False).report["cloud"] is None
 

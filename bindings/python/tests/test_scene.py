@@ -73,7 +73,7 @@ def test_the_command_makes_a_ply_file_and_prints_the_report(tmp_path: Path, caps
     assert report["gaussians"] == len(vg.Gaussians.load_ply(asset))
     assert main([str(tmp_path), str(asset)]) == 1
     assert capsys.readouterr().err.startswith("vehicle_gaussians: error: ")
-    # A photograph is not replaced, nor does a PLY file get another format's name.
+    # A photograph is not replaced, and a PLY file cannot have another format's name.
     for name in ("000.png", "car.spz"):
         with pytest.raises(SystemExit):
             main([str(SEDAN), str(tmp_path / name)])

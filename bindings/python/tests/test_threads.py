@@ -89,7 +89,7 @@ def test_an_exception_of_the_progress_function_passes_through(ellipsoid: Views) 
 
 
 def test_ctrl_c_stops_a_reconstruction() -> None:
-    # A shell that starts its jobs in the background has them ignore Ctrl-C.
+    # A shell makes its background jobs ignore Ctrl-C.
     code = f"""
 import signal
 import vehicle_gaussians as vg

@@ -1,4 +1,4 @@
-"""Pictures that PyTorch differentiates; without PyTorch, what is said about it."""
+"""Differentiable rendering with PyTorch; without PyTorch, the error."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_importing_the_package_does_not_import_torch() -> None:
 
 
 def test_without_torch_the_error_says_what_to_install() -> None:
-    # An entry of None is how Python marks a module that is not there.
+    # An entry of None makes Python treat the module as missing.
     code = "import sys; sys.modules['torch'] = None; import vehicle_gaussians.torch"
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
     assert ran.returncode == 1
@@ -42,7 +42,7 @@ def camera() -> vg.Camera:
 
 @pytest.fixture
 def scene(torch: Any) -> dict[str, Any]:
-    """Three Gaussians, so wide that every pixel is inside of each: nothing jumps when they move a little."""
+    """Three Gaussians, so wide that every pixel is inside each: small motions cause no jumps."""
     values = {
         "means": [[0.3, 0.2, 0.1], [-0.2, 0.4, -0.3], [0.1, -0.5, 0.2]],
         # Norms 2.6, 0.6 and 1.3.
@@ -65,7 +65,7 @@ def draw(scene: dict[str, Any], camera: vg.Camera, **settings: Any) -> Any:
 
 
 def weighted(torch: Any, picture: Any) -> Any:
-    """A loss that looks at every number of the picture, in doubles, so that a difference of losses is one."""
+    """A loss of every number of the picture, in doubles, so that differences of losses are exact."""
     total = torch.zeros((), dtype=torch.float64)
     for k, plane in enumerate(picture):
         weights = torch.cos(torch.arange(plane.numel(), dtype=torch.float64) * 0.7 + k).reshape(plane.shape)
@@ -104,7 +104,7 @@ def test_the_gradient_of_a_quaternion_of_any_norm_is_its_own(
     with torch.no_grad():
         longer["quats"] *= -8
     weighted(torch, draw(longer, camera)).backward()
-    # Eight times as long and the other way round: the same rotation, an eighth of the gradient.
+    # Eight times as long and negated: the same rotation, an eighth of the gradient.
     torch.testing.assert_close(longer["quats"].grad, first / -8, rtol=1e-4, atol=1e-5)
     along = (scene["quats"].grad * scene["quats"]).sum(1)
     assert along.abs().max() < 1e-3 * first.abs().max()
@@ -161,7 +161,7 @@ def test_a_second_way_back_is_an_error(torch: Any, scene: dict[str, Any], camera
     (first,) = torch.autograd.grad(loss, scene["means"], create_graph=True)
     with pytest.raises(RuntimeError, match="once_differentiable"):
         first.sum().backward()
-    # What was drawn of is not what it was.
+    # The input of the render was changed in place.
     loss = weighted(torch, draw(scene, camera))
     with torch.no_grad():
         scene["means"] += 1

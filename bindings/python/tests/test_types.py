@@ -1,4 +1,4 @@
-"""Calls that are legal pass ``mypy --strict``, and run; calls that are not fail both.
+"""Legal calls pass ``mypy --strict`` and run; illegal calls fail both.
 
 The comments that silence mypy are checked, too: one that silences nothing is an error.
 """

@@ -1,4 +1,4 @@
-"""Warnings, and lines for the logger, alike in both faces."""
+"""Warnings, and lines for the logger, equal in both interfaces."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def test_depth_that_one_view_lacks_bends_the_shape_and_warns_of_the_callers_line
         without = face.reconstruct(*views, [None] * 4, check=False)
         asked = face.reconstruct(*views, some, prior="shape", check=False)
     assert without.report["cloud"] is None
-    # Who asks for the shape alone gets it.
+    # An explicit prior "shape" ignores the depth.
     assert asked.gaussians.means.tobytes() == without.gaussians.means.tobytes()
-    # The view without depth is the better for that of the others.
+    # The view without depth gains from the depth of the others.
     last = (ellipsoid.images[3], ellipsoid.masks[3], ellipsoid.cameras[3], ellipsoid.depths[3])
     errors = [face.view_errors(model.gaussians, *last).depth_mae_m for model in (made, without)]
     assert errors[0] < 0.7 * errors[1], errors
@@ -49,7 +49,7 @@ def test_a_budget_that_was_not_kept_warns(face: Any, ellipsoid: Views) -> None:
         vg.VgWarning, match=r"^budget: 0\.0001 s was not kept: the call took \d+\.\d\d s, though all"
     ) as caught:
         made = face.reconstruct(*views, budget=1e-4)
-    # A model of one coarse view is not believed either, and that is said too.
+    # A model of one coarse view also has a poor verdict, which is a further warning.
     assert {warning.filename for warning in caught} == {__file__}
     told = [str(warning.message) for warning in caught]
     assert [text for text in told if not text.startswith(("bad: ", "doubtful: "))] == made.report["warnings"]

@@ -1,5 +1,5 @@
-//! `vg align`: the similarity from a scene's world to the vehicle's frame, from a scan, from camera centres somebody
-//! measured, from the vehicle's size, or from a matrix.
+//! `vg align`: the similarity from a scene's world to the vehicle's frame, from a scan, from measured camera centres,
+//! from the vehicle's size, or from a matrix.
 
 use crate::args::{AlignArgs, Mode};
 use crate::files::{Kind, Results};
@@ -14,19 +14,20 @@ use vg::geometry::Similarity;
 use vg::io::{self, FitQuality, MaskedViews};
 use vg::progress::Threads;
 
-/// Fewer centres leave the turn about their line open.
+/// Smallest number of camera centres; two leave the rotation about their line undetermined.
 const FEWEST: usize = 3;
 
-/// A similarity, how well it fits, and what else there is to say, a line each.
+/// A similarity and how well it fits.
 struct Found {
     vehicle_from_world: Similarity,
     quality: Option<FitQuality>,
+    /// Details for the user, one line each.
     lines: Vec<String>,
-    /// What the caller should look at.
+    /// Warnings for the user.
     notes: Vec<String>,
 }
 
-/// Finds, writes, and says how well it fits.
+/// Finds and writes the similarity, and prints how well it fits.
 pub(crate) fn run(args: &AlignArgs) -> Result {
     let mode = args.mode();
     let scan = match mode {
@@ -40,7 +41,7 @@ pub(crate) fn run(args: &AlignArgs) -> Result {
         Mode::Centers(path) | Mode::Matrix(path) => Some(path.to_owned()),
     };
     let results = Results::new([(Kind::Json, Some(&args.output))]);
-    results.prepare(&Inputs::of_alignment().files(&input).scene(&args.scene))?;
+    results.prepare(&Inputs::for_alignment().files(&input).scene(&args.scene))?;
     let found = Threads::new(args.threads)?.run(|| match mode {
         Mode::Scan(_) => by_scan(args, scan.as_deref().unwrap_or(Path::new(""))),
         Mode::Centers(path) => by_centers(args, path),
@@ -60,8 +61,8 @@ pub(crate) fn run(args: &AlignArgs) -> Result {
     Ok(results.outcome(Outcome::done(text)))
 }
 
-/// The similarity to a scan, of a file or of the scene's folder, and the masks it was found with.
-pub(crate) fn to_scan_of(
+/// Finds the similarity to a scan: `scan`, or the scan in the scene's folder.
+pub(crate) fn align_to_scan(
     scene: &Path,
     scan: Option<&Path>,
     heading: Heading,
@@ -78,10 +79,10 @@ fn by_scan(args: &AlignArgs, path: &Path) -> Result<Found> {
     let (scene, found) = by_masks(&args.scene, Some(path), args.heading())?;
     let mut lines = vec![masks_line(found.views, &scene)];
     lines.push(format!(
-        "outlines differ by {:.2} pixels on average, the other way round by {:.2}",
+        "outlines differ by {:.2} pixels on average, with front and rear swapped by {:.2}",
         found.residual_px, found.other_px
     ));
-    lines.push(format!("{} sparse points lie on the scan, to {:.4} m", found.points, found.points_m));
+    lines.push(format!("{} sparse points lie within {:.4} m of the scan", found.points, found.points_m));
     let quality = FitQuality { residual_m: found.residual_m, confidence: found.confidence };
     let notes = scene.notes;
     Ok(Found { vehicle_from_world: found.vehicle_from_world, quality: Some(quality), lines, notes })
@@ -94,8 +95,8 @@ fn by_box(args: &AlignArgs, size: [f64; 3]) -> Result<Found> {
     let [l, w, h] = found.found_m;
     let lines = vec![
         masks_line(found.views, &scene),
-        format!("the masks' hull measures {l:.3} x {w:.3} x {h:.3} m"),
-        format!("front from {}", found.asked_view),
+        format!("the visual hull of the masks measures {l:.3} x {w:.3} x {h:.3} m"),
+        format!("front decided by view {}", found.asked_view),
     ];
     let quality = FitQuality { residual_m: found.residual_m, confidence: found.confidence };
     let notes = scene.notes;
@@ -107,13 +108,16 @@ fn by_centers(args: &AlignArgs, path: &Path) -> Result<Found> {
     if known.len() < FEWEST {
         let (path, n) = (path.display(), known.len());
         return Err(Failure::job(format!(
-            "{path}: {n} camera centres; expected at least {FEWEST}, not on one line"
+            "{path}: found {n} camera centres; expected at least {FEWEST} that are not on one line"
         )));
     }
     let alignment = io::vehicle_from_known_centers(&args.scene, &known)?;
     let pairs = known.iter().zip(alignment.residuals.iter().zip(&alignment.kept));
     let line = |((name, _), (residual, kept)): (&(String, _), (&f64, &bool))| {
-        format!("{name}: {residual:.4} m{}", if *kept { "" } else { ", left out: it contradicts the others" })
+        format!(
+            "{name}: {residual:.4} m{}",
+            if *kept { "" } else { ", left out: inconsistent with the others" }
+        )
     };
     let quality = FitQuality { residual_m: alignment.residual(), confidence: alignment.confidence() };
     let lines = pairs.map(line).collect();
@@ -122,7 +126,7 @@ fn by_centers(args: &AlignArgs, path: &Path) -> Result<Found> {
 }
 
 fn by_matrix(args: &AlignArgs, path: &Path) -> Result<Found> {
-    // A name that is no scene is a slip worth telling.
+    // A path that is not a scene is reported.
     let options = io::SceneOptions { vehicle_from_world: Some(io::read_matrix(path)?), ..Default::default() };
     io::list_scene(&args.scene, &options)?;
     let vehicle_from_world = options.vehicle_from_world.unwrap_or(Similarity::IDENTITY);
@@ -132,11 +136,12 @@ fn by_matrix(args: &AlignArgs, path: &Path) -> Result<Found> {
 fn masks_line(used: usize, scene: &MaskedViews) -> String {
     match scene.views.len() + scene.unmasked - used {
         0 => format!("{used} masks"),
-        without => format!("{used} masks; {without} views without one were left out"),
+        1 => format!("{used} masks; 1 view without a mask was left out"),
+        without => format!("{used} masks; {without} views without a mask were left out"),
     }
 }
 
-/// The library's argument as the user wrote it.
+/// The library's error with the argument as it is called on the command line.
 fn named(error: Error, scene: &Path, scan: Option<&Path>) -> Failure {
     match error {
         Error::Argument { argument, found, allowed } => Failure::job(match argument.as_str() {

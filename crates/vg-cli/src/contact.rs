@@ -1,19 +1,19 @@
-//! A contact sheet: rows of pictures at half size with thin gaps, to see at a glance what was made.
+//! A contact sheet: rows of pictures at half size with thin gaps, an overview of the result.
 
 use crate::job::Result;
 use std::path::Path;
 use vg::io::image;
 
-/// Space between pictures, pixels of the sheet; the line between rows is its middle.
+/// Space between pictures, pixels of the sheet; a line runs along its middle between rows.
 const GAP: usize = 9;
 
 /// Pixels of a picture per pixel of the sheet, each way.
 const SHRINK: usize = 2;
 
-/// Rows of white that stay above and below the vehicles, pixels of a picture.
+/// Rows of white that are kept above and below the vehicles, pixels of a picture.
 const MARGIN: usize = 8;
 
-/// Colours a channel may have. Fewer than 256 make the file a third smaller, and nobody sees it.
+/// Levels of each channel. Fewer than 256 make the file a third smaller without a visible difference.
 const LEVELS: usize = 64;
 
 /// The line between rows.
@@ -27,8 +27,8 @@ pub(crate) struct Tile {
     pub(crate) pixels: Vec<[u8; 3]>,
 }
 
-/// Writes the rows, top to bottom, as one PNG. White above and below the vehicles is cut off, the same in every
-/// picture, so that pictures above each other can be compared.
+/// Writes the rows, top to bottom, as one PNG. White above and below the vehicles is cut off at the same rows of all
+/// pictures, so that pictures above each other can be compared.
 pub(crate) fn write(path: &Path, rows: &[Vec<Tile>]) -> Result<()> {
     let tiles = || rows.iter().flatten();
     let (top, bottom) = content(tiles());
@@ -73,7 +73,7 @@ fn content<'a>(tiles: impl Iterator<Item = &'a Tile>) -> (usize, usize) {
     (top.saturating_sub(MARGIN), (bottom + MARGIN).min(tallest))
 }
 
-/// Mean of the pixels from column `u0` and row `v0` that one pixel of the sheet stands for.
+/// Mean of the [`SHRINK`] x [`SHRINK`] pixels from column `u0` and row `v0`, which become one pixel of the sheet.
 fn shrunk(tile: &Tile, u0: usize, v0: usize) -> [u8; 3] {
     const AREA: usize = SHRINK * SHRINK;
     let level = |sum: usize| (sum * (LEVELS - 1) * 2 + AREA * 255) / (2 * AREA * 255);

@@ -1,9 +1,9 @@
-//! `vg demo`: the whole job on the sample inside the program, with pictures to look at.
+//! `vg demo`: the whole pipeline on the bundled sample, with pictures.
 
 use crate::args::DemoArgs;
 use crate::contact::{self, Tile};
-use crate::eval::judge::OfVehicle;
-use crate::eval::measure::{self, Measured, Shown};
+use crate::eval::judge::References;
+use crate::eval::measure::{self, Measured, MethodInput};
 use crate::eval::split;
 use crate::guard::{self, Inputs};
 use crate::job::{Failure, Outcome, Result};
@@ -15,7 +15,7 @@ use vg::pipeline::{Options, PriorChoice};
 use vg::progress::Threads;
 use vg::render::{RenderOptions, Rendered};
 
-/// Four photographs of the right side in; the model, its left side and the errors there out.
+/// Reconstructs from four photographs of the right side; renders the left side and measures the errors there.
 pub(crate) fn run(args: &DemoArgs) -> Result {
     let folder = &args.folder;
     let (scene_folder, unseen) = (folder.join("scene"), folder.join("unseen"));
@@ -31,7 +31,7 @@ pub(crate) fn run(args: &DemoArgs) -> Result {
     let pictures: Vec<PathBuf> = names.iter().map(|name| unseen.join(name)).collect();
     guard::refuse_clashes(&pictures, &Inputs::default().scene(&scene_folder))?;
     files::prepare_folder(&unseen)?;
-    // Photographs, masks and cameras are all this gets; the sample's depth is for the comparison below.
+    // Input is photographs, masks and cameras; the sample's depth is only for the comparison below.
     let without_depth = SceneOptions { load_depth: false, ..SceneOptions::default() };
     let shape =
         Options { prior: PriorChoice::Shape, threads: args.threads, points: true, ..Options::default() };
@@ -59,8 +59,8 @@ pub(crate) fn run(args: &DemoArgs) -> Result {
     contact::write(&sheet, &rows)?;
 
     let given = Options { prior: PriorChoice::Given, ..shape.clone() };
-    let shown = Shown::plain(&scene_folder, &without_depth);
-    let bound = measure::split(&shown, &split, &given, &OfVehicle::default(), &threads)?;
+    let input = MethodInput::plain(&scene_folder, &without_depth);
+    let bound = measure::split(&input, &split, &given, &References::default(), &threads)?;
     Ok(Outcome::done(text(folder, &split, &measured, &bound)))
 }
 
@@ -74,7 +74,7 @@ fn rendered(picture: &Rendered) -> Tile {
     Tile { size: (picture.width, picture.height), pixels: picture.to_rgb8() }
 }
 
-/// The main figures, and where to look.
+/// The main figures and the files written.
 fn text(folder: &Path, split: &split::Split, shape: &Measured, given: &Measured) -> String {
     let row = |name: &str, m: &Measured| {
         format!(
@@ -88,17 +88,17 @@ fn text(folder: &Path, split: &split::Split, shape: &Measured, given: &Measured)
         )
     };
     let written = [
-        ("contact.png", "inputs; the unseen side as rendered; the same as photographed"),
-        ("unseen", "the renders in full size"),
+        ("contact.png", "rows: inputs; renders of the unseen side; its photographs"),
+        ("unseen", "the renders at full size"),
         ("asset.ply", "the model, for any viewer of 3D Gaussians"),
         ("points.ply", "the metric coloured point cloud of the inputs"),
         ("report.json", "stage times, counts, what was left out and why"),
-        ("scene", "the sample itself, to try the other commands on"),
+        ("scene", "the sample itself, for trying the other commands"),
     ];
     let files = written.map(|(name, what)| format!("  {name:<12} {what}"));
     [
         format!(
-            "{} photographs of the right side in; errors in {} photographs of the left side:",
+            "input: {} photographs of the right side; errors against {} photographs of the left side:",
             split.input.len(),
             split.test.len()
         ),
@@ -108,7 +108,7 @@ fn text(folder: &Path, split: &split::Split, shape: &Measured, given: &Measured)
         ),
         row("silhouettes (--prior shape)", shape),
         row("the scene (--prior given)", given),
-        "The second row is given the true depth of the inputs. Of the first row there are now,".into(),
+        "The second row uses the true depth of the inputs. Files of the first row,".into(),
         format!("in {}:", shown::path(folder)),
         files.join("\n"),
     ]

@@ -1,4 +1,4 @@
-//! Files and folders a command writes: checked before the work, complete or not there at all after it.
+//! Output files and folders: checked before the work starts; a file is written completely or not at all.
 
 use crate::guard::{self, Inputs};
 use crate::job::{Failure, Outcome, Result, USAGE};
@@ -6,7 +6,7 @@ use crate::shown;
 use std::io::{BufWriter, ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-/// What a file holds, which the ending of its name must not contradict.
+/// Format of a file, which the extension of its name must not contradict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Ply,
@@ -47,7 +47,7 @@ impl Kind {
         !matches!(self, Self::Ply | Self::Png)
     }
 
-    /// A name without an ending says nothing; devices and pipes are called what they are called.
+    /// Refuses an extension of another format. A name without extension, a device or a pipe is accepted.
     fn check_name(self, path: &Path) -> Result<()> {
         let is_special = path.exists() && !path.is_file() && !path.is_dir();
         let Some(ending) = path.extension().filter(|_| !is_special && !is_standard_output(path)) else {
@@ -57,30 +57,32 @@ impl Kind {
             return Ok(());
         }
         let (name, endings) = (self.name(), self.endings().join(" or ."));
-        let message = format!("{}: this is {name}; expected a name that ends in .{endings}", path.display());
+        let message =
+            format!("{}: the output is {name}; expected a name that ends in .{endings}", path.display());
         Err(Failure { message, code: USAGE })
     }
 }
 
-/// The results of a command that are one file each.
+/// Results of a command that are one file each.
 #[derive(Debug)]
 pub(crate) struct Results(Vec<(Kind, PathBuf)>);
 
 impl Results {
-    /// Those that were asked for.
+    /// The results that were requested.
     pub(crate) fn new<const N: usize>(asked: [(Kind, Option<&PathBuf>); N]) -> Self {
         Self(asked.into_iter().filter_map(|(kind, path)| Some((kind, path?.clone()))).collect())
     }
 
-    /// Refuses, before work is spent on them, names that clash, names that say something else, and places that take no
-    /// files.
+    /// Refuses, before any work is done, names that clash, names with another format's extension, and places that
+    /// cannot be written.
     pub(crate) fn prepare(&self, inputs: &Inputs) -> Result<()> {
         let paths: Vec<PathBuf> = self.0.iter().map(|(_, path)| path.clone()).collect();
         guard::refuse_clashes(&paths, inputs)?;
         self.0.iter().try_for_each(|(kind, path)| kind.check_name(path))?;
         for (kind, path) in &self.0 {
             if is_standard_output(path) && !kind.is_text() && std::io::stdout().is_terminal() {
-                let message = format!("-: standard output is a terminal and takes no {}", kind.name());
+                let message =
+                    format!("-: {} cannot go to a terminal; redirect it or name a file", kind.name());
                 return Err(Failure { message, code: USAGE });
             }
             prepare(path)?;
@@ -88,7 +90,7 @@ impl Results {
         Ok(())
     }
 
-    /// What the command says beside its results: nothing where one of them is on standard output.
+    /// The outcome with its text dropped where one of the results is on standard output.
     pub(crate) fn outcome(&self, outcome: Outcome) -> Outcome {
         match self.0.iter().any(|(_, path)| is_standard_output(path)) {
             true => Outcome { text: String::new(), ..outcome },
@@ -97,21 +99,21 @@ impl Results {
     }
 }
 
-/// Whether a file by this name is standard output: `-`, or what the system calls it.
+/// Whether this name is standard output: `-`, or the system's name for it.
 pub(crate) fn is_standard_output(path: &Path) -> bool {
     let names = ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
     names.iter().any(|name| path.as_os_str() == *name)
 }
 
-/// The file to read by this name: `-` is standard input.
+/// The file to read for this name: `-` is standard input.
 pub(crate) fn input(path: &Path) -> &Path {
     if cfg!(unix) && path.as_os_str() == "-" { Path::new("/dev/stdin") } else { path }
 }
 
-/// Makes sure that the file's folder exists and takes files, and that the file is no folder.
+/// Ensures that the file's folder exists and is writable, and that the file is not a folder.
 fn prepare(path: &Path) -> Result<()> {
     if path.is_dir() {
-        return Err(Failure::job(format!("{}: is a folder; expected a file to write", path.display())));
+        return Err(Failure::job(format!("{}: is a folder; expected the name of a file", path.display())));
     }
     if is_standard_output(path) || (path.exists() && !path.is_file()) {
         return Ok(()); // a device or a pipe: its folder is not written to
@@ -121,33 +123,34 @@ fn prepare(path: &Path) -> Result<()> {
     Ok(vg::io::check_folder(folder)?)
 }
 
-/// Creates the folder with those above it.
+/// Creates the folder and its parents.
 pub(crate) fn prepare_folder(folder: &Path) -> Result<()> {
     if folder.as_os_str() == "-" {
-        let message = "-: several files do not go to standard output; expected a folder (./- is one)";
+        let message =
+            "-: several files cannot go to standard output; expected a folder (./- for one named -)";
         return Err(Failure { message: message.into(), code: USAGE });
     }
     std::fs::create_dir_all(folder).map_err(|e| Failure::job(format!("{}: {e}", folder.display())))
 }
 
-/// Writes a file by way of a temporary one beside it, so that nobody meets half of it, or standard output.
+/// Writes a file atomically, through a temporary file in the same folder, or writes to standard output.
 pub(crate) fn write(path: &Path, write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     if !is_standard_output(path) {
         return Ok(vg::io::write_atomically(path, write)?);
     }
     let mut out = BufWriter::new(std::io::stdout().lock());
     match write(&mut out).and_then(|()| out.flush()) {
-        // A reader that has gone away has what it wanted.
+        // A closed pipe is no error: its reader needs no more.
         Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
         written => written.map_err(|e| Failure::job(format!("standard output: {e}"))),
     }
 }
 
-/// Writes a value as indented JSON, in which control characters are escaped, also those that JSON would let be.
+/// Writes a value as indented JSON in which all control characters are escaped, also those that JSON allows.
 pub(crate) fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     let text =
         serde_json::to_string_pretty(value).map_err(|e| Failure::job(format!("{}: {e}", path.display())))?;
-    // Outside its strings JSON holds no such character but the line feed.
+    // Outside its strings, this JSON contains no control character other than the line feed.
     let escaped = |c: char| match c == '\n' || shown::is_plain(c) {
         true => c.to_string(),
         false => format!("\\u{:04x}", u32::from(c)),
@@ -161,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_that_says_another_format_is_refused_and_one_that_says_none_is_not() {
+    fn an_extension_of_another_format_is_refused_and_a_missing_one_is_not() {
         for (kind, name) in [
             (Kind::Ply, "car.spz"),
             (Kind::Ply, "car.ply.gz"),

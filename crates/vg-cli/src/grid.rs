@@ -1,18 +1,18 @@
-//! Numbers in rows: for a terminal, as Markdown, as CSV.
+//! Tables of numbers: for a terminal, as Markdown, as CSV.
 
 use crate::shown;
 
-/// What stands for no number.
+/// Placeholder for a missing number.
 const NONE: &str = "-";
 
-/// What is in a column.
+/// Heading and kind of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Column {
-    /// Words, on the left.
+    /// Words, aligned to the left.
     Words(&'static str),
-    /// Numbers, on the right.
+    /// Numbers, aligned to the right.
     Numbers(&'static str),
-    /// Numbers that are shown only where a row has one.
+    /// Numbers; the column is shown only if a row has one.
     Rare(&'static str),
 }
 
@@ -24,7 +24,7 @@ impl Column {
     }
 }
 
-/// Cells below headings.
+/// A table: headings and rows of cells.
 pub(crate) struct Grid {
     columns: Vec<Column>,
     rows: Vec<Vec<String>>,
@@ -36,32 +36,32 @@ pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
 }
 
 impl Grid {
-    /// With no rows yet.
+    /// A table without rows.
     pub(crate) fn new(columns: &[Column]) -> Self {
         Self { columns: columns.to_vec(), rows: Vec::new() }
     }
 
-    /// A row with a cell for each column, each one line of text.
+    /// Appends a row with a cell for each column, each one line of text.
     pub(crate) fn push(&mut self, cells: impl Into<Vec<String>>) {
         let cells: Vec<String> = cells.into().iter().map(|cell| shown::line(cell)).collect();
         debug_assert_eq!(cells.len(), self.columns.len());
         self.rows.push(cells);
     }
 
-    /// Indices of the columns that have something to show.
+    /// Indices of the columns that are shown.
     fn shown(&self) -> Vec<usize> {
         let has_any = |c: usize| self.rows.iter().any(|row| row[c] != NONE);
         let is_shown = |&c: &usize| !matches!(self.columns[c], Column::Rare(_)) || has_any(c);
         (0..self.columns.len()).filter(is_shown).collect()
     }
 
-    /// Headings, then rows.
+    /// The headings, then the rows.
     fn lines(&self) -> impl Iterator<Item = Vec<&str>> {
         let headings = self.columns.iter().map(|column| column.heading()).collect();
         std::iter::once(headings).chain(self.rows.iter().map(|row| row.iter().map(String::as_str).collect()))
     }
 
-    /// Lines without trailing spaces; nothing without rows.
+    /// The table as text without trailing spaces; empty if there are no rows.
     pub(crate) fn text(&self) -> String {
         if self.rows.is_empty() {
             return String::new();
@@ -79,7 +79,7 @@ impl Grid {
         self.lines().map(line).collect::<Vec<_>>().join("\n")
     }
 
-    /// A table of Markdown; the columns that [`Grid::text`] shows.
+    /// The table as Markdown, with the columns that [`Grid::text`] shows.
     pub(crate) fn markdown(&self) -> String {
         let shown = self.shown();
         let row = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
@@ -95,7 +95,7 @@ impl Grid {
         headings + &rule + &lines.map(cells).collect::<String>()
     }
 
-    /// Comma-separated, all columns; no number is an empty cell.
+    /// The table as comma-separated values, all columns; a missing number is an empty cell.
     pub(crate) fn csv(&self) -> String {
         let quoted = |text: &str| {
             let plain = !text.contains([',', '"', '\n', '\r']);
@@ -112,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_grid_is_aligned_and_leaves_out_what_nobody_has() {
+    fn a_grid_is_aligned_and_leaves_out_columns_without_numbers() {
         let mut grid = Grid::new(&[Column::Words("a"), Column::Numbers("number"), Column::Rare("rare")]);
         assert_eq!((grid.text(), grid.csv()), (String::new(), "a,number,rare\n".into()));
         grid.push(["x, y".into(), number(Some(1.25), 1), number(None, 3)]);

@@ -1,7 +1,7 @@
-//! The rule for results: none replaces a file that the command reads, a file of a scene, or another result.
+//! Protects inputs: a result never replaces a file that the command reads, a file of a scene, or another result.
 //!
-//! Files are known by what the file system calls them and not by their spelling. A scene's folders of pictures, masks,
-//! depth and COLMAP models take no results at all: a new picture there would be one of the scene's from then on.
+//! Files are identified by the file system, not by the spelling of their names. No result is written into a scene's
+//! folders of pictures, masks, depth and COLMAP models, because a new picture there would become part of the scene.
 
 use crate::files::is_standard_output;
 use crate::job::{Failure, Result};
@@ -11,31 +11,31 @@ use std::path::{Path, PathBuf};
 use vg::geometry::Similarity;
 use vg::io::{SceneFormat, SceneOptions, colmap_format, folds_case, list_scene, resolved};
 
-/// Folders that belong to a scene, directly in its own.
+/// Folders that belong to a scene, directly in the scene's folder.
 const FOLDERS: [&str; 7] =
     ["images", "masks", "mask", "depth", "sparse", "colmap_processed", "3dscanner_origin"];
 
-/// The similarity to the vehicle's frame, as docs and `align` call it.
+/// File name of the similarity to the vehicle's frame in the documentation and in `align`.
 const SIMILARITY: &str = "vehicle_from_world.json";
 
-/// Files of COLMAP models, without their endings.
+/// Files of COLMAP models, without their extensions.
 const MODEL_FILES: [&str; 5] = ["cameras", "images", "points3D", "rigs", "frames"];
 
-/// Names of the files that list a scene's pictures, as nerfstudio and the NeRF synthetic scenes have them.
+/// Files that list a scene's pictures in nerfstudio and in the NeRF synthetic scenes.
 const TRANSFORMS: [&str; 4] =
     ["transforms.json", "transforms_train.json", "transforms_val.json", "transforms_test.json"];
 
-/// A file as the file system knows it.
+/// Identity of a file in the file system.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 enum Place {
-    /// Device and number of a file or folder that exists.
+    /// Device and inode of a file or folder that exists.
     #[cfg(unix)]
     Node(u64, u64),
     Path(PathBuf),
 }
 
 impl Place {
-    fn of(path: &Path) -> Self {
+    fn from_path(path: &Path) -> Self {
         let path = resolved(path);
         #[cfg(unix)]
         if let Ok(meta) = fs::metadata(&path)
@@ -48,36 +48,36 @@ impl Place {
     }
 }
 
-/// What no result of a command may replace.
+/// Files and folders that no result of a command may replace.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Inputs {
-    /// With why.
+    /// Files, each with the reason.
     files: HashMap<Place, String>,
-    /// With their names and that of the scene.
+    /// Folders, each with its name and that of its scene.
     folders: HashMap<Place, [PathBuf; 2]>,
-    /// Scenes that are known already.
+    /// Scenes that were already added.
     roots: HashSet<Place>,
     /// Whether the command makes similarities, so that it may replace one that it does not read.
     makes_similarity: bool,
 }
 
 impl Inputs {
-    /// Of a command that makes the similarity to the vehicle's frame.
-    pub(crate) fn of_alignment() -> Self {
+    /// Inputs of a command that makes the similarity to the vehicle's frame.
+    pub(crate) fn for_alignment() -> Self {
         Self { makes_similarity: true, ..Self::default() }
     }
 
-    /// With files that the command reads.
+    /// Adds files that the command reads.
     pub(crate) fn files<'a, P: AsRef<Path> + ?Sized + 'a>(
         mut self,
         paths: impl IntoIterator<Item = &'a P>,
     ) -> Self {
-        let why = || "is read by this job".to_owned();
-        self.files.extend(paths.into_iter().map(|path| (Place::of(path.as_ref()), why())));
+        let why = || "is an input of this command".to_owned();
+        self.files.extend(paths.into_iter().map(|path| (Place::from_path(path.as_ref()), why())));
         self
     }
 
-    /// With all files of the scene at `path`, chosen by the command or not.
+    /// Adds all files of the scene at `path`, whether the command uses them or not.
     pub(crate) fn scene(mut self, path: &Path) -> Self {
         let folder = if path.is_dir() { path } else { path.parent().unwrap_or(path) };
         let folder = resolved(if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
@@ -85,7 +85,7 @@ impl Inputs {
         if path.is_file() {
             self.add_transforms(path, &folder);
         }
-        // A COLMAP model may be given by its own folder, two below that of the scene.
+        // A COLMAP model may be given by its own folder, two levels below that of the scene.
         for above in folder.ancestors().skip(1).take(2) {
             if above.join("images").is_dir() && colmap_format(above).is_some() {
                 self.add_root(above);
@@ -95,11 +95,11 @@ impl Inputs {
     }
 
     fn add_root(&mut self, root: &Path) {
-        if !self.roots.insert(Place::of(root)) {
+        if !self.roots.insert(Place::from_path(root)) {
             return;
         }
         for folder in FOLDERS.map(|name| root.join(name)).into_iter().filter(|folder| folder.is_dir()) {
-            self.folders.insert(Place::of(&folder), [folder.clone(), root.to_owned()]);
+            self.folders.insert(Place::from_path(&folder), [folder.clone(), root.to_owned()]);
             self.add_below(&folder, root);
         }
         for entry in fs::read_dir(root).into_iter().flatten().flatten() {
@@ -107,7 +107,7 @@ impl Inputs {
             let (name, stem) = (entry.file_name(), path.file_stem().unwrap_or_default());
             let is_similarity = name == SIMILARITY && !self.makes_similarity;
             if name == "split.json" || is_similarity || MODEL_FILES.iter().any(|file| stem == *file) {
-                self.add_of_scene(&path, root);
+                self.add_scene_file(&path, root);
             }
         }
         for path in TRANSFORMS.map(|name| root.join(name)).into_iter().filter(|path| path.is_file()) {
@@ -115,25 +115,25 @@ impl Inputs {
         }
     }
 
-    fn add_of_scene(&mut self, path: &Path, root: &Path) {
+    fn add_scene_file(&mut self, path: &Path, root: &Path) {
         if path.is_file() {
-            self.files.insert(Place::of(path), format!("belongs to the scene {}", root.display()));
+            self.files.insert(Place::from_path(path), format!("belongs to the scene {}", root.display()));
         }
     }
 
-    /// The files in a folder and in those in it; links to files lead out of it.
+    /// Adds the files in a folder and its subfolders, with the targets of links.
     fn add_below(&mut self, folder: &Path, root: &Path) {
         for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
             match entry.file_type() {
                 Ok(kind) if kind.is_dir() => self.add_below(&entry.path(), root),
-                _ => self.add_of_scene(&entry.path(), root),
+                _ => self.add_scene_file(&entry.path(), root),
             }
         }
     }
 
-    /// The file and all that it lists. What is wrong with it is for the command to tell.
+    /// Adds the file and all files that it lists. Errors in it are left to the command.
     fn add_transforms(&mut self, path: &Path, root: &Path) {
-        self.add_of_scene(path, root);
+        self.add_scene_file(path, root);
         let options = SceneOptions {
             vehicle_from_world: Some(Similarity::IDENTITY),
             format: Some(SceneFormat::Transforms),
@@ -143,20 +143,20 @@ impl Inputs {
         for view in index.iter().flat_map(|index| &index.views) {
             let depth = view.depth.as_ref().map(|depth| &depth.path);
             for file in [Some(&view.image), view.mask.as_ref(), depth].into_iter().flatten() {
-                self.add_of_scene(file, root);
+                self.add_scene_file(file, root);
             }
         }
     }
 }
 
-/// Refuses results that would replace inputs or each other, and those in folders of a scene, also of one that the
+/// Refuses results that would replace inputs or each other, and results in folders of a scene, even of a scene that the
 /// command does not name.
 pub(crate) fn refuse_clashes(results: &[PathBuf], inputs: &Inputs) -> Result<()> {
     let (to_output, results): (Vec<&PathBuf>, Vec<&PathBuf>) =
         results.iter().partition(|path| is_standard_output(path));
     if to_output.len() > 1 {
         return Err(Failure::job(format!(
-            "{} results would go to standard output; expected at most one",
+            "{} results would go to standard output; allowed: one",
             to_output.len()
         )));
     }
@@ -168,7 +168,7 @@ pub(crate) fn refuse_clashes(results: &[PathBuf], inputs: &Inputs) -> Result<()>
         inputs.add_root(folder);
     }
     for result in &results {
-        if let Some(why) = inputs.files.get(&Place::of(result)) {
+        if let Some(why) = inputs.files.get(&Place::from_path(result)) {
             return Err(Failure::job(format!(
                 "{}: {why} and would be replaced; choose another name",
                 result.display()
@@ -176,10 +176,10 @@ pub(crate) fn refuse_clashes(results: &[PathBuf], inputs: &Inputs) -> Result<()>
         }
     }
     for folder in folders {
-        let taken = folder.ancestors().find_map(|folder| inputs.folders.get(&Place::of(folder)));
+        let taken = folder.ancestors().find_map(|folder| inputs.folders.get(&Place::from_path(folder)));
         if let Some([taken, scene]) = taken {
             return Err(Failure::job(format!(
-                "{}: files of the scene {} are in {}, and a result would become one of them; choose another folder",
+                "{}: a result here would become part of the scene {}, whose files are in {}; choose another folder",
                 folder.display(),
                 scene.display(),
                 taken.display()
@@ -189,25 +189,25 @@ pub(crate) fn refuse_clashes(results: &[PathBuf], inputs: &Inputs) -> Result<()>
     refuse_repeated(&results, &places)
 }
 
-/// Whether poses are listed in the folder.
+/// Whether the folder contains a list of poses.
 fn is_scene(folder: &Path) -> bool {
     TRANSFORMS.iter().any(|name| folder.join(name).is_file()) || colmap_format(folder).is_some()
 }
 
-/// `places` are the results' absolute names.
+/// Refuses two results with one name; `places` are the results' absolute paths.
 fn refuse_repeated(results: &[&PathBuf], places: &[PathBuf]) -> Result<()> {
     let mut seen = HashMap::new();
     let mut in_lower_case = HashMap::new();
     let twice = |first: usize, i: usize| {
         Err(Failure::job(format!(
-            "{}: two results (number {} and number {}) would have this name",
+            "{}: two results (number {} and number {}) would have this name; choose two names",
             results[i].display(),
             first + 1,
             i + 1
         )))
     };
     for (i, place) in places.iter().enumerate() {
-        if let Some(first) = seen.insert(Place::of(place), i) {
+        if let Some(first) = seen.insert(Place::from_path(place), i) {
             return twice(first, i);
         }
         let lower = place.to_string_lossy().to_lowercase();
@@ -256,7 +256,7 @@ mod tests {
         let inputs = Inputs::default().files([&at.join("photo.png")]);
         for name in ["photo.png", "hard.png", "soft.png", "here/photo.png"] {
             let message = refused(&[name], &inputs, at).unwrap();
-            assert!(message.contains("is read by this job and would be replaced"), "{message}");
+            assert!(message.contains("is an input of this command and would be replaced"), "{message}");
         }
         for other in ["dangling.ply", "here/new.ply"] {
             assert!(refused(&["new.ply", other], &inputs, at).unwrap().contains("two results"));
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scenes_folders_take_no_results_whoever_names_the_scene() {
+    fn a_scenes_folders_accept_no_results_even_if_the_scene_is_not_named() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
         for folder in ["s/images/left", "s/masks", "s/sparse/0", "plain/images"] {

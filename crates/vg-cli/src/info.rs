@@ -1,4 +1,4 @@
-//! `vg info`: what is in a PLY file, and what looks wrong with it.
+//! `vg info`: contents and problems of a PLY file.
 
 use crate::args::InfoArgs;
 use crate::files;
@@ -9,34 +9,34 @@ use vg::Gaussians;
 use vg::io::ply::{self, Content, OtherGaussians, PlyNotes};
 use vg::render::options::ALPHA_THRESHOLD;
 
-/// Longest side that a vehicle may have, metres, as `--box` accepts it.
+/// Largest side of a vehicle, metres, as `--box` accepts it.
 const LARGEST_M: f32 = 30.0;
 
-/// Shortest length of a vehicle, metres.
+/// Smallest length of a vehicle, metres.
 const SMALLEST_M: f32 = 0.1;
 
-/// The largest standard deviation a reconstruction makes, metres.
+/// Largest standard deviation of a Gaussian that a reconstruction makes, metres.
 const LARGEST_SCALE_M: f32 = 3.0;
 
-/// A scale that no Gaussian of a vehicle has; exp of a small number of metres is above it.
+/// Scale that no Gaussian of a vehicle reaches, but exp(s) of a small s in metres exceeds.
 const SMALLEST_LINEAR_SCALE: f32 = 1.0;
 
-/// Opacities of logits from 0 to 1, the logistic function of which they are.
-const OPACITIES_OF_LINEAR: std::ops::RangeInclusive<f32> = 0.5..=0.731_06;
+/// Logistic function of 0 to 1: the range of opacities that were stored without taking logits.
+const SIGMOID_OF_UNIT_INTERVAL: std::ops::RangeInclusive<f32> = 0.5..=0.731_06;
 
-/// So few opacities may all lie there by chance.
+/// With fewer opacities than this, all may lie in that range by chance.
 const FEW: usize = 100;
 
-/// Gaussians, Gaussians that are not drawn, or coloured points.
+/// Describes Gaussians, Gaussians of a kind that is not rendered, or coloured points.
 pub(crate) fn run(args: &InfoArgs) -> Result {
     Ok(Outcome::done(match ply::read_content(files::input(&args.file))? {
-        Content::Gaussians(gaussians, notes) => of_gaussians(&gaussians, &notes),
-        Content::Others(others) => of_others(&others),
-        Content::Points((positions, _)) => of_points(&positions),
+        Content::Gaussians(gaussians, notes) => describe_gaussians(&gaussians, &notes),
+        Content::Others(others) => describe_others(&others),
+        Content::Points((positions, _)) => describe_points(&positions),
     }))
 }
 
-fn of_gaussians(gaussians: &Gaussians, notes: &PlyNotes) -> String {
+fn describe_gaussians(gaussians: &Gaussians, notes: &PlyNotes) -> String {
     let mut text = format!("Gaussians: {}\n", shown::count(gaussians.len()));
     let _ = writeln!(text, "SH degree: {}", gaussians.sh_degree());
     text += &extent(gaussians.bounds());
@@ -51,15 +51,15 @@ fn of_gaussians(gaussians: &Gaussians, notes: &PlyNotes) -> String {
     text + &listed(&problems(gaussians, notes))
 }
 
-fn of_others(others: &OtherGaussians) -> String {
+fn describe_others(others: &OtherGaussians) -> String {
     let mut text = format!("Gaussians: {}\nkind: {}\n", shown::count(others.count), others.kind);
     text += &extent(others.bounds);
-    let mut problems = vec![format!("render and refine refuse it: {}", shown::line(&others.why))];
+    let mut problems = vec![format!("render and refine do not accept it: {}", shown::line(&others.why))];
     problems.extend(others.bounds.and_then(|bounds| implausible_size(Some(&bounds), false)));
     text + &listed(&problems)
 }
 
-fn of_points(positions: &[[f32; 3]]) -> String {
+fn describe_points(positions: &[[f32; 3]]) -> String {
     let bounds = positions.iter().fold(None, |bounds: Option<([f32; 3], [f32; 3])>, p| {
         let (low, high) = bounds.unwrap_or((*p, *p));
         Some((std::array::from_fn(|k| low[k].min(p[k])), std::array::from_fn(|k| high[k].max(p[k]))))
@@ -89,38 +89,41 @@ fn problems(gaussians: &Gaussians, notes: &PlyNotes) -> Vec<String> {
     let mut found = Vec::new();
     if !notes.ignored.is_empty() {
         let names: Vec<String> = notes.ignored.iter().map(|name| shown::line(name)).collect();
-        found.push(format!("properties that Gaussians do not have, ignored: {}", names.join(", ")));
+        found.push(format!("unknown properties, ignored: {}", names.join(", ")));
     }
     if notes.clamped_scales > 0 {
-        found.push(format!("{} scales too small for a float, raised", shown::count(notes.clamped_scales)));
+        found.push(format!("scales too small for a float, raised: {}", shown::count(notes.clamped_scales)));
     }
     found.extend(implausible_size(gaussians.bounds().as_ref(), gaussians.is_empty()));
     found.extend(linear_numbers(gaussians));
     let count = |test: &dyn Fn(usize) -> bool| (0..gaussians.len()).filter(|&i| test(i)).count();
     let invisible = count(&|i| gaussians.opacities()[i] < ALPHA_THRESHOLD);
     if invisible > 0 {
-        found.push(format!("{} Gaussians are never drawn: opacity below 1/255", shown::count(invisible)));
+        found.push(format!(
+            "Gaussians that are never drawn, opacity below 1/255: {}",
+            shown::count(invisible)
+        ));
     }
     let huge = count(&|i| gaussians.scales()[i].iter().any(|&s| s > LARGEST_SCALE_M));
     if huge > 0 {
-        found.push(format!("{} Gaussians are larger than {LARGEST_SCALE_M} m", shown::count(huge)));
+        found.push(format!("Gaussians larger than {LARGEST_SCALE_M} m: {}", shown::count(huge)));
     }
     found
 }
 
-/// Signs that numbers were stored as they are, where the layout wants logarithms of scales and logits of opacities.
+/// Signs that scales and opacities were stored directly; the layout requires logarithms and logits.
 pub(crate) fn linear_numbers(gaussians: &Gaussians) -> Vec<String> {
     let mut found = Vec::new();
     let smallest = gaussians.scales().as_flattened().iter().copied().fold(f32::INFINITY, f32::min);
     if !gaussians.is_empty() && smallest >= SMALLEST_LINEAR_SCALE {
         found.push(format!(
-            "every scale is {smallest:.3} m or more: are scale_0 to scale_2 metres and not their natural logarithms? \
-             The layout wants ln(0.01) = -4.6 for 1 cm"
+            "every scale is {smallest:.3} m or more: are scale_0 to scale_2 metres instead of natural logarithms? \
+             The layout requires ln(0.01) = -4.6 for 1 cm"
         ));
     }
-    if gaussians.len() >= FEW && gaussians.opacities().iter().all(|o| OPACITIES_OF_LINEAR.contains(o)) {
+    if gaussians.len() >= FEW && gaussians.opacities().iter().all(|o| SIGMOID_OF_UNIT_INTERVAL.contains(o)) {
         found.push(
-            "every opacity lies between 0.5 and 0.73: are the numbers opacities and not their logits?".into(),
+            "every opacity lies between 0.5 and 0.73: does the file hold opacities instead of logits?".into(),
         );
     }
     found
@@ -128,11 +131,13 @@ pub(crate) fn linear_numbers(gaussians: &Gaussians) -> Vec<String> {
 
 fn implausible_size(bounds: Option<&([f32; 3], [f32; 3])>, is_empty: bool) -> Option<String> {
     if is_empty {
-        return Some("it is empty".into());
+        return Some("the file holds no points".into());
     }
     let (low, high) = bounds?;
     let longest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f32::max);
     (!(SMALLEST_M..=LARGEST_M).contains(&longest)).then(|| {
-        format!("the longest side is {longest} m; a vehicle has {SMALLEST_M} to {LARGEST_M} m: is the unit a metre?")
+        format!(
+            "the longest side is {longest} m; expected {SMALLEST_M} to {LARGEST_M} m: is the unit a metre?"
+        )
     })
 }

@@ -1,4 +1,4 @@
-//! The end that comes from outside: a signal, or a parent that is gone. No temporary file stays behind, and the exit
+//! Termination from outside: a signal, or the end of the parent process. No temporary file stays behind, and the exit
 //! code names the signal.
 
 use std::process::ExitCode;
@@ -7,23 +7,23 @@ use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 use vg::io::writes;
 
-/// What a shell reports of a process that a signal ended is this and the signal's number.
+/// A shell reports a process that was ended by a signal as this plus the signal's number.
 const BY_SIGNAL: usize = 128;
 
-/// SIGHUP, and what a process gets whose parent is gone.
+/// SIGHUP, also used when the parent process has ended.
 const HANG_UP: usize = 1;
 
 /// 0, or the code to exit with.
 static CODE: LazyLock<Arc<AtomicUsize>> = LazyLock::new(Arc::default);
 
-/// The code to exit with, where the program was told to end.
+/// The exit code after an interruption; `None` without one.
 pub(crate) fn code() -> Option<ExitCode> {
     let code = CODE.load(Ordering::SeqCst);
     (code != 0).then(|| ExitCode::from(u8::try_from(code).unwrap_or(u8::MAX)))
 }
 
-/// Lets INT, TERM and HUP end the program: at once where no temporary file exists, else as soon as the writes under way
-/// have failed and removed theirs. A file that grows beyond its limit becomes an error and not the end.
+/// Makes INT, TERM and HUP end the program: at once where no temporary file exists, else as soon as the writes in
+/// progress have stopped and removed theirs. A file that exceeds its size limit becomes an error, not a termination.
 #[cfg(unix)]
 pub(crate) fn watch() {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
@@ -33,8 +33,8 @@ pub(crate) fn watch() {
             continue;
         }
         let code = BY_SIGNAL as i32 + signal;
-        // In this order: whoever sees the stop knows the code, and an end at once comes last. Where one cannot be had the
-        // signal does what it does to any program.
+        // The order matters: the code is set before the stop flag, and immediate shutdown comes last. If a handler
+        // cannot be registered, the signal keeps its default effect.
         let _ = flag::register_usize(signal, CODE.clone(), code as usize)
             .and_then(|_| flag::register(signal, writes().stop_flag()))
             .and_then(|_| flag::register_conditional_shutdown(signal, code, writes().idle_flag()));
@@ -45,7 +45,7 @@ pub(crate) fn watch() {
 #[cfg(not(unix))]
 pub(crate) fn watch() {}
 
-/// Whether the parent wants the signal ignored, as `nohup` does; `false` where the system does not tell.
+/// Whether the signal was ignored by the parent, as `nohup` does; `false` where the system does not report it.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -54,8 +54,8 @@ fn is_ignored(signal: i32) -> bool {
     mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
-/// Ends the program when its standard input does: the parent holds the other end of that pipe, and the system closes it
-/// however the parent ends.
+/// Ends the program when its standard input ends: the parent holds the other end of that pipe, and the system closes it
+/// in whatever way the parent ends.
 pub(crate) fn end_with_input() {
     let watch = || {
         let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());

@@ -1,4 +1,4 @@
-//! What a command leaves behind: text to print, or a failure with its exit code.
+//! Outcome of a command: text to print, or a failure with its exit code.
 
 use crate::shown;
 use std::io::Write;
@@ -7,38 +7,38 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Exit code of a job that failed: bad data, or a file that cannot be read or written.
 pub(crate) const FAILED: u8 = 1;
 
-/// Exit code of arguments that make no sense.
+/// Exit code of invalid arguments.
 pub(crate) const USAGE: u8 = 2;
 
-/// What a command that ran to its end says.
+/// Outcome of a command that ran to its end.
 pub(crate) struct Outcome {
-    /// For standard output.
+    /// Text for standard output.
     pub(crate) text: String,
-    /// `false` if a part of the job failed, which has been said already.
+    /// `false` if a part of the job failed, which has already been reported.
     pub(crate) complete: bool,
 }
 
 impl Outcome {
-    /// Everything went well.
+    /// Outcome of a command that succeeded completely.
     pub(crate) fn done(text: impl Into<String>) -> Self {
         Self { text: text.into(), complete: true }
     }
 }
 
-/// Why a command did not do its job.
+/// Failure of a command.
 #[derive(Debug)]
 pub(crate) struct Failure {
-    /// The cause.
+    /// Cause of the failure.
     pub(crate) message: String,
     /// Exit code.
     pub(crate) code: u8,
 }
 
-/// What a command returns.
+/// Result of a command.
 pub(crate) type Result<T = Outcome> = std::result::Result<T, Failure>;
 
 impl Failure {
-    /// The data or the file system is at fault.
+    /// Failure caused by the data or the file system.
     pub(crate) fn job(message: impl Into<String>) -> Self {
         Self { message: message.into(), code: FAILED }
     }
@@ -50,10 +50,10 @@ impl From<vg::Error> for Failure {
     }
 }
 
-/// What looks like a mistake, kept until it is known how the job ends.
+/// Warnings, kept until the job has succeeded or failed.
 static NOTES: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-/// Notes something that is legal but looks like a mistake, once.
+/// Records a warning about something legal that looks like a mistake, unless it is already recorded.
 pub(crate) fn note(text: &str) {
     let mut notes = notes();
     if !notes.iter().any(|known| known == text) {
@@ -65,18 +65,18 @@ fn notes() -> MutexGuard<'static, Vec<String>> {
     NOTES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The notes so far, for a result that shows them; they remain to be told.
+/// The notes so far, for a result that shows them; they are still printed later.
 pub(crate) fn noted() -> Vec<String> {
     notes().clone()
 }
 
-/// The notes so far as warnings, a line each: for a job that went well.
-pub(crate) fn warn() {
+/// Prints the notes so far as warnings, one line each, for a job that succeeded.
+pub(crate) fn print_warnings() {
     notes().drain(..).for_each(|note| line("warning", &note));
 }
 
-/// Why a job failed, in one line. What was noted before may be the reason behind the reason.
-pub(crate) fn complain(message: &str) {
+/// Prints why a job failed, on one line, with the earlier notes, which may explain the cause.
+pub(crate) fn print_error(message: &str) {
     let noted: Vec<String> = notes().drain(..).collect();
     match noted.as_slice() {
         [] => line("error", message),
@@ -88,12 +88,12 @@ pub(crate) fn complain(message: &str) {
 fn line(what: &str, message: &str) {
     // File names may hold line breaks and terminal commands.
     let line = shown::line(message);
-    // Nobody is left to tell if this fails.
+    // A failure to write an error cannot be reported.
     let _ = writeln!(std::io::stderr(), "vg: {what}: {line}");
 }
 
-/// Writes the outcome's text to standard output; what is left of control characters but the line feed is escaped. A reader that has gone away (`vg info x | head -1`) has what it
-/// wanted.
+/// Writes the outcome's text to standard output; remaining control characters other than the line feed are escaped. A
+/// closed pipe (`vg info x | head -1`) is no error.
 pub(crate) fn print(outcome: &Outcome) -> Result<Outcome> {
     let mut out = std::io::stdout().lock();
     let lines: Vec<String> = outcome.text.split('\n').map(shown::line).collect();

@@ -1,7 +1,7 @@
 //! The program `vg`: photographs of one side of a vehicle in, a complete metric 3D Gaussian model out.
 //!
-//! What a command has to say goes to standard output, once, when it is done; errors, warnings and progress go to
-//! standard error. An error is one line, `vg: error: <cause>`.
+//! A command prints its result on standard output once, when it is done; errors, warnings and progress go to standard
+//! error. An error is one line, `vg: error: <cause>`.
 
 mod align;
 mod args;
@@ -48,24 +48,24 @@ fn main() -> ExitCode {
         Command::Demo(args) => demo::run(args),
         Command::Align(args) => align::run(args),
     };
-    // A job that was told to end has nothing to say of it.
+    // An interrupted job prints no result and no error.
     if let Some(code) = interrupt::code() {
         return code;
     }
     if outcome.is_ok() {
-        job::warn();
+        job::print_warnings();
     }
     match outcome.and_then(|outcome| job::print(&outcome)) {
         Ok(Outcome { complete: true, .. }) => ExitCode::SUCCESS,
         Ok(_) => ExitCode::from(job::FAILED),
         Err(failure) => {
-            job::complain(&failure.message);
+            job::print_error(&failure.message);
             ExitCode::from(failure.code)
         }
     }
 }
 
-/// Help and version as asked for; anything else in one line, and the code for wrong usage.
+/// Prints help and version as asked for; anything else is wrong usage, printed on one line.
 fn usage(error: &clap::Error) -> ExitCode {
     use clap::error::ErrorKind;
     let text = error.render().to_string();
@@ -81,7 +81,7 @@ fn usage(error: &clap::Error) -> ExitCode {
             ExitCode::from(job::USAGE)
         }
         _ => {
-            job::complain(&one_line(&text));
+            job::print_error(&one_line(&text));
             ExitCode::from(job::USAGE)
         }
     }
@@ -89,9 +89,9 @@ fn usage(error: &clap::Error) -> ExitCode {
 
 /// The argument parser's message without its usage lines, on one line.
 fn one_line(text: &str) -> String {
-    let said = text.split("\n\nUsage:").next().unwrap_or(text);
-    let said = said.split("\n\nFor more information").next().unwrap_or(said);
-    let said = said.strip_prefix("error: ").unwrap_or(said);
-    let words: Vec<&str> = said.split_whitespace().collect();
-    format!("{} (--help tells more)", words.join(" "))
+    let message = text.split("\n\nUsage:").next().unwrap_or(text);
+    let message = message.split("\n\nFor more information").next().unwrap_or(message);
+    let message = message.strip_prefix("error: ").unwrap_or(message);
+    let words: Vec<&str> = message.split_whitespace().collect();
+    format!("{} (see --help)", words.join(" "))
 }

@@ -1,22 +1,22 @@
-//! The most memory that a reconstruction takes: in a process of its own, because an allocator keeps what earlier work
-//! gave back.
+//! Peak memory of a reconstruction, measured in a process of its own, because an allocator keeps memory that earlier
+//! work has freed.
 
 use std::ffi::OsString;
 use std::process::{Command, Stdio};
 use vg::geometry::Similarity;
 
-/// Takes what is written, on every system that has one.
-const NOWHERE: &str = if cfg!(windows) { "NUL" } else { "/dev/null" };
+/// The null device.
+const NULL_DEVICE: &str = if cfg!(windows) { "NUL" } else { "/dev/null" };
 
-/// Runs `vg reconstruct` with these words, in this frame, and returns the highest resident memory of that process, bytes;
-/// `None` where it fails or the system does not tell. The process writes no file, and ends when this one does.
-pub(crate) fn of_reconstruction(
+/// Runs `vg reconstruct` with these words, in this frame, and returns the peak resident memory of that process, bytes;
+/// `None` where it fails or the system does not report it. The process writes no file, and ends when this one does.
+pub(crate) fn reconstruction_peak(
     words: impl IntoIterator<Item = OsString>,
     frame: Option<&Similarity>,
 ) -> Option<u64> {
     let mut command = Command::new(std::env::current_exe().ok()?);
     command.arg("reconstruct").args(words);
-    command.args(["--output", NOWHERE, "--report", "-", "--end-with-input"]);
+    command.args(["--output", NULL_DEVICE, "--report", "-", "--end-with-input"]);
     if let Some(frame) = frame {
         command.arg(format!("--frame-matrix={:?}", frame.to_row_major()));
     }

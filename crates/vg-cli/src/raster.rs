@@ -1,16 +1,16 @@
-//! A plot as PNG: SVG drawn with the font inside the program, so that every machine gets the same bytes.
+//! Rasterises a plot: SVG to PNG with the bundled font, so that every machine makes the same bytes.
 
 use crate::job::{Failure, Result};
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 
-/// Pixels per unit of the SVG, for screens with small pixels.
+/// Pixels per unit of the SVG, for high-resolution screens.
 const SCALE: f32 = 2.0;
 
-/// What the font calls itself.
+/// Family name of the font.
 const FONT: &str = "Noto Sans";
 
-/// Draws an SVG of a known size, on nothing where it has no background. Letters that Noto Sans has not are left out.
+/// Draws an SVG of a known size on a transparent background. Characters that Noto Sans lacks are left out.
 pub(crate) fn png(svg: &str) -> Result<Vec<u8>> {
     let broken = |why: String| Failure::job(format!("the plot cannot be drawn: {why}"));
     let mut options = Options { font_family: FONT.into(), ..Options::default() };
@@ -58,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_svg_is_an_error() {
+    fn invalid_svg_is_an_error() {
         assert!(png("<svg").unwrap_err().message.starts_with("the plot cannot be drawn: "));
     }
 }

@@ -1,4 +1,4 @@
-//! `vg reconstruct`: a scene in, a model out.
+//! `vg reconstruct`: makes a model from a scene.
 
 use crate::args::{ReconstructArgs, Strict, StrictArgs};
 use crate::files::{Kind, Results};
@@ -14,12 +14,12 @@ use vg::progress::Threads;
 use vg::scene::Segmenter;
 use vg::{Scene, View, io};
 
-/// Opens, reconstructs, writes.
+/// Opens the scene, reconstructs, and writes the results.
 pub(crate) fn run(args: &ReconstructArgs) -> Result {
     if args.end_with_input {
         interrupt::end_with_input();
     }
-    // Depth that will not be used is not read either.
+    // Depth that will not be used is not read.
     let mut options = scene::options(&args.frame, args.depth.depth_scale, args.method.wants_depth())?;
     if let Some(frame) = &args.frame_matrix {
         options.vehicle_from_world =
@@ -31,7 +31,7 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
         (Kind::Ply, args.points.as_ref()),
         (Kind::Json, args.report.as_ref()),
     ]);
-    let inputs = Inputs::default().files(&scene::files_of(&index)).files(args.method.files());
+    let inputs = Inputs::default().files(&scene::view_files(&index)).files(args.method.files());
     let inputs = inputs.files(&args.mask_model).files(&args.frame.vehicle_from_world);
     results.prepare(&inputs.scene(&args.scene))?;
 
@@ -54,21 +54,24 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
     Ok(results.outcome(Outcome::done(text)))
 }
 
-/// What a user should hear of a reconstruction that went well.
+/// Records the warnings of a successful reconstruction for the user.
 pub(crate) fn note_warnings(report: &Report) {
     for reason in &report.verdict_reasons {
         note(&reason.to_string());
     }
-    let of_network = report.network.iter().flat_map(|network| &network.warnings);
-    for warning in report.warnings.iter().chain(of_network) {
+    let network_warnings = report.network.iter().flat_map(|network| &network.warnings);
+    for warning in report.warnings.iter().chain(network_warnings) {
         note(warning);
     }
     for left in report.left_out.iter().filter(|left| left.what == pipeline::GAUSSIANS) {
-        note(&format!("{}; --max-gaussians N allows more, --resolution SHARE chooses another", left.why));
+        note(&format!(
+            "{}; --max-gaussians N allows more, --resolution SHARE sets another resolution",
+            left.why
+        ));
     }
 }
 
-/// An error where the caller does not want what the verdict says. The reasons were noted.
+/// Returns an error if the verdict is one that `--strict` rejects. Its reasons are noted before.
 pub(crate) fn accept(report: &Report, strict: &StrictArgs) -> Result<()> {
     let least = match strict.strict {
         None => return Ok(()),
@@ -79,10 +82,10 @@ pub(crate) fn accept(report: &Report, strict: &StrictArgs) -> Result<()> {
         return Ok(());
     }
     let verdict = verdict(report.verdict);
-    Err(Failure::job(format!("--strict: the result is {verdict}, and nothing was written")))
+    Err(Failure::job(format!("--strict: the result is {verdict}; nothing was written")))
 }
 
-/// As users read it.
+/// The verdict as text.
 pub(crate) fn verdict(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Good => "good",
@@ -92,44 +95,44 @@ pub(crate) fn verdict(verdict: Verdict) -> &'static str {
     }
 }
 
-/// Masks of a network for the views that have none, and what to say of it. The network is opened only then.
+/// Fills missing masks by a network, which is opened only if there are any; returns a text for the summary.
 fn fill_masks(args: &ReconstructArgs, views: &mut [View], threads: &Threads) -> Result<String> {
     let Some(path) = &args.mask_model else { return Ok(String::new()) };
     if views.iter().all(|view| view.mask.is_some()) {
-        note(&format!("{}: not opened, every view has a mask", path.display()));
+        note(&format!("{}: not used, because every view has a mask", path.display()));
         return Ok(String::new());
     }
     let segmenter = Segmenter::new(Model::open(path, &args.method.model_options())?)?;
     let filled = threads.run(|| segmenter.fill(views))?;
     for view in views.iter().filter(|v| v.mask.as_ref().is_some_and(|m| m.vehicle_pixels() == 0)) {
-        note(&format!("{}: no vehicle pixel in its mask", view.name));
+        note(&format!("{}: the network found no vehicle in this view", view.name));
     }
-    Ok(format!("; masks of {filled} views by {}", segmenter.name()))
+    Ok(format!("; masks of {} by {}", shown::counted(filled, "view"), segmenter.name()))
 }
 
-/// With progress on a terminal.
+/// Reconstructs with a progress bar on a terminal.
 pub(crate) fn reconstruct(scene: &Scene, options: &Options, threads: &Threads) -> Result<Reconstruction> {
-    let bar = Bar::of_reconstruction();
+    let bar = Bar::for_reconstruction();
     Ok(pipeline::reconstruct_on(threads, scene, options, &mut |progress| bar.show(progress))?)
 }
 
-/// One line.
+/// Summary of the reconstruction on one line.
 pub(crate) fn summary(made: &Reconstruction) -> String {
     let report = &made.report;
     let size = report.vehicle.map_or_else(String::new, |v| format!("{}, ", shown::size(&v)));
     format!(
-        "{} Gaussians, {size}SH degree {}, prior {}, {} views, {:.2} s{}; verdict: {}",
-        shown::count(report.gaussians),
+        "{}, {size}SH degree {}, prior {}, {}, {:.2} s{}; verdict: {}",
+        shown::counted(report.gaussians, "Gaussian"),
         report.sh_degree,
         report.prior,
-        report.views_used.len(),
+        shown::counted(report.views_used.len(), "view"),
         report.total_ms / 1e3,
         check(report),
         verdict(report.verdict),
     )
 }
 
-/// What the check says of all views.
+/// Result of the check over all views.
 fn check(report: &Report) -> String {
     let Some(InputError { psnr_db, silhouette_iou, mask_covered }) = report.input_error else {
         return String::new();
@@ -139,15 +142,15 @@ fn check(report: &Report) -> String {
         format!(" ({:.2} dB, {:.3} by the cameras as given)", given.psnr_db, given.silhouette_iou)
     });
     format!(
-        "; on these views PSNR {psnr_db:.2} dB, silhouette IoU {silhouette_iou:.3}{given}, at least {:.1} % of each mask \
-         covered",
+        "; on these views PSNR {psnr_db:.2} dB, silhouette IoU {silhouette_iou:.3}{given}, at least {:.1} % of each \
+         mask covered",
         100.0 * mask_covered
     )
 }
 
-/// What the check says of each view, a line each.
+/// Result of the check in each view, one line each.
 fn views(report: &Report) -> String {
-    /// More are for the report.
+    /// Largest number of views that are printed.
     const MOST: usize = 16;
     let line = |view: &CheckedView| {
         let CheckedView { name, errors, by_given_camera: given } = view;
@@ -165,7 +168,7 @@ fn views(report: &Report) -> String {
     };
     let more = match report.input_views.len().saturating_sub(MOST) {
         0 => String::new(),
-        more => format!("\n  and {more} more, which --report tells"),
+        more => format!("\n  and {more} more; --report R.json lists all"),
     };
     report.input_views.iter().take(MOST).map(line).collect::<String>() + &more
 }

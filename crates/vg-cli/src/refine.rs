@@ -1,4 +1,4 @@
-//! `vg refine`: a model and photographs in, the model moved towards the photographs out.
+//! `vg refine`: optimises a model against photographs.
 
 use crate::args::RefineArgs;
 use crate::files::{Kind, Results};
@@ -11,7 +11,7 @@ use vg::io::{self, ply};
 use vg::progress::Threads;
 use vg::refine::{self, Densify, RefineOptions, Refinement, Stop};
 
-/// What `--report` writes.
+/// JSON document of `--report`.
 #[derive(Serialize)]
 struct Document<'a> {
     version: &'static str,
@@ -19,12 +19,12 @@ struct Document<'a> {
     refinement: &'a Refinement,
 }
 
-/// Opens, refines, writes.
+/// Opens model and scene, refines, and writes the results.
 pub(crate) fn run(args: &RefineArgs) -> Result {
     let options = scene::options(&args.frame, None, false)?;
     let index = io::list_scene(&args.scene, &scene::named(args.views.names().as_deref(), &options))?;
     let results = Results::new([(Kind::Ply, Some(&args.output)), (Kind::Json, args.report.as_ref())]);
-    let inputs = Inputs::default().files(&scene::files_of(&index)).files([&args.asset]);
+    let inputs = Inputs::default().files(&scene::view_files(&index)).files([&args.asset]);
     results.prepare(&inputs.files(&args.frame.vehicle_from_world).scene(&args.scene))?;
 
     let (gaussians, _) = ply::read(files::input(&args.asset))?;
@@ -41,13 +41,13 @@ pub(crate) fn run(args: &RefineArgs) -> Result {
         backend: args.backend,
         ..RefineOptions::default()
     };
-    let bar = Bar::of_reconstruction();
+    let bar = Bar::for_reconstruction();
     let mut show = |progress| bar.show(progress);
     let (refined, done) = refine::model_on(&threads, &gaussians, &opened.scene, &settings, &mut show)?;
     drop(bar);
     match done.stop {
-        Stop::Unseen => job::note("no view sees anything of the model: it is as it was"),
-        Stop::Diverged => job::note("the error grew; the best of the states before is returned"),
+        Stop::Unseen => job::note("no view sees the model, which is written unchanged"),
+        Stop::Diverged => job::note("the error grew, so the best earlier state of the model is written"),
         Stop::Done | Stop::HeldOut => {}
     }
     files::write(&args.output, |out| ply::write_to(out, &refined))?;
@@ -55,13 +55,14 @@ pub(crate) fn run(args: &RefineArgs) -> Result {
         let version = env!("CARGO_PKG_VERSION");
         files::write_json(path, &Document { version, settings: &settings, refinement: &done })?;
     }
-    let gaussians = shown::count(refined.len());
-    let text = format!("{}: {gaussians} Gaussians, {}", shown::path(&args.output), summary(&done));
+    let gaussians = shown::counted(refined.len(), "Gaussian");
+    let text = format!("{}: {gaussians}, {}", shown::path(&args.output), summary(&done));
     Ok(results.outcome(Outcome::done(text)))
 }
 
-/// One line.
+/// Summary of the refinement on one line.
 fn summary(done: &Refinement) -> String {
     let [before, after] = done.psnr_db;
-    format!("{} steps, PSNR of these views {before:.2} -> {after:.2} dB", done.kept)
+    let steps = shown::counted(done.kept as usize, "step");
+    format!("{steps}, PSNR of these views {before:.2} -> {after:.2} dB")
 }

@@ -1,4 +1,4 @@
-//! `vg render`: a model as a scene's cameras see it, or from all around.
+//! `vg render`: renders a model from a scene's cameras, or from all around.
 
 use crate::args::RenderArgs;
 use crate::guard::{self, Inputs};
@@ -15,17 +15,17 @@ use vg::progress::Threads;
 use vg::render::{AssetRenderer, Background, RenderOptions, Rendered, Rgba8};
 use vg::{Camera, Gaussians};
 
-/// Reads the model, draws it into every camera.
+/// Reads the model and renders it from every camera.
 pub(crate) fn run(args: &RenderArgs) -> Result {
     let (gaussians, _) = ply::read(files::input(&args.asset))?;
     info::linear_numbers(&gaussians).iter().for_each(|sign| job::note(sign));
     let mut inputs = Inputs::default().files([&args.asset]).files(&args.frame.vehicle_from_world);
     let cameras = match (&args.cameras, args.turntable) {
         (Some(path), _) => {
-            // The cameras alone: neither pictures nor depth need exist.
+            // Only the cameras are read: neither pictures nor depth need exist.
             let options = scene::options(&args.frame, None, true)?;
             let index = io::list_scene(path, &scene::named(args.views.names().as_deref(), &options))?;
-            inputs = inputs.files(&scene::files_of(&index)).scene(path);
+            inputs = inputs.files(&scene::view_files(&index)).scene(path);
             index.notes.iter().for_each(|note| job::note(note));
             index.cameras()
         }
@@ -46,7 +46,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result {
     let options = RenderOptions { background: args.background, ..RenderOptions::default() };
     let threads = Threads::new(args.threads)?;
     let ready = threads.run(|| AssetRenderer::new(Arc::new(gaussians), args.backend))?;
-    let bar = Bar::of_pictures(cameras.len());
+    let bar = Bar::for_pictures(cameras.len());
     let seen: Vec<Camera> = cameras.iter().map(|named| named.camera).collect();
     if args.depth {
         let each = |i: usize, drawn: &Rendered| {
@@ -54,14 +54,14 @@ pub(crate) fn run(args: &RenderArgs) -> Result {
             let beyond = image::write_depth16(&depths[i], drawn.width, drawn.height, &drawn.depth)?;
             if beyond > 0 {
                 let path = depths[i].display();
-                job::note(&format!("{path}: {beyond} pixels lie beyond 65.535 m and hold none"));
+                job::note(&format!("{path}: pixels farther than 65.535 m, written as 0: {beyond}"));
             }
             bar.advance();
             Ok(())
         };
         threads.run(|| ready.render_each(&seen, &options, &mut Rendered::default(), each))?;
     } else {
-        // Encoding takes longer than drawing: as many at a time as there are threads.
+        // Encoding takes longer than rendering, so pictures are encoded in parallel, one per thread.
         let mut waiting = Vec::new();
         let each = |i: usize, drawn: &Rgba8| {
             waiting.push((i, drawn.pixels.clone()));
@@ -73,19 +73,18 @@ pub(crate) fn run(args: &RenderArgs) -> Result {
                 bar.advance();
                 Ok(())
             };
-            // The first picture's error, whichever came first.
+            // The error of the first picture in order, whichever occurred first.
             let written: Vec<vg::Result<()>> = waiting.par_drain(..).map(write).collect();
             written.into_iter().collect()
         };
         threads.run(|| ready.render_each(&seen, &options, &mut Rgba8::default(), each))?;
     }
     drop(bar);
-    let (folder, n) = (shown::path(&args.output), cameras.len());
-    let pictures = if n == 1 { "picture" } else { "pictures" };
-    Ok(Outcome::done(format!("{folder}: {n} {pictures} by {}", ready.choice())))
+    let (folder, pictures) = (shown::path(&args.output), shown::counted(cameras.len(), "picture"));
+    Ok(Outcome::done(format!("{folder}: {pictures} by {}", ready.choice())))
 }
 
-/// As [`write`], of a picture of 8 bits.
+/// As [`write`], for a picture of 8 bits per channel.
 fn write_bytes(path: &Path, camera: &Camera, rgba: &[[u8; 4]], background: Background) -> vg::Result<()> {
     match background {
         Background::Color(_) => {
@@ -96,7 +95,7 @@ fn write_bytes(path: &Path, camera: &Camera, rgba: &[[u8; 4]], background: Backg
     }
 }
 
-/// An opaque picture, or one with its own alpha on a transparent background.
+/// Writes an opaque picture, or one with alpha for a transparent background.
 pub(crate) fn write(path: &Path, drawn: &Rendered, background: Background) -> vg::Result<()> {
     match background {
         Background::Color(_) => image::write_rgb8(path, drawn.width, drawn.height, &drawn.to_rgb8()),
@@ -104,8 +103,8 @@ pub(crate) fn write(path: &Path, drawn: &Rendered, background: Background) -> vg
     }
 }
 
-/// `<image stem>.png` for each picture's name; where two would be one, all with the folders of their names, and where
-/// that does not tell them apart either, with their extensions too.
+/// `<image stem>.png` for each picture's name; if two were equal, all with the folders of their names; if two were
+/// still equal, also with their extensions.
 pub(crate) fn picture_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<PathBuf> {
     let names: Vec<&str> = names.into_iter().collect();
     let png = |path: &Path| {
@@ -125,14 +124,14 @@ pub(crate) fn picture_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec
     all.iter().find(|paths| are_distinct(paths)).unwrap_or(short).clone()
 }
 
-/// `n` cameras on a circle around the middle of the model, named by their numbers.
+/// `n` cameras on a circle around the centre of the model, named by their numbers.
 pub(crate) fn turntable(
     gaussians: &Gaussians,
     n: u32,
     (width, height): (u32, u32),
 ) -> Result<Vec<NamedCamera>> {
     let (low, high) =
-        gaussians.bounds().ok_or_else(|| Failure::job("the model has no Gaussians to walk around"))?;
+        gaussians.bounds().ok_or_else(|| Failure::job("the model has no Gaussians to render"))?;
     let cameras = Turntable::default().cameras(low, high, n as usize, width, height)?;
     let digits = (n - 1).to_string().len().max(3);
     let named = |(i, camera)| NamedCamera { name: format!("{i:0digits$}.png"), camera };

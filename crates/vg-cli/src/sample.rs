@@ -1,4 +1,4 @@
-//! The sample inside this program: the scene of tests/data/sedan, so that the demo needs no file and no network.
+//! The bundled sample: the scene of tests/data/sedan, so that the demo needs no file and no network.
 
 use crate::files;
 use crate::job::{Failure, Result};
@@ -10,7 +10,7 @@ macro_rules! sample {
     };
 }
 
-/// Path in the scene's folder, and content.
+/// Path in the scene's folder and contents of each file.
 const FILES: &[(&str, &[u8])] = sample![
     "README.md" "transforms.json" "split.json" "vehicle.json" "vehicle_from_world.json"
     "images/000.png" "images/001.png" "images/002.png" "images/003.png"
@@ -21,14 +21,15 @@ const FILES: &[(&str, &[u8])] = sample![
     "sparse/0/cameras.bin" "sparse/0/images.bin" "sparse/0/points3D.bin"
 ];
 
-/// Writes the scene into this folder, unless it is there. Files of these names that are not the sample's are somebody's
-/// scene, of which nothing is replaced.
+/// Writes the files of the scene that are missing in this folder. A file of the same name with other contents is an
+/// error, because it belongs to another scene; nothing is replaced.
 pub(crate) fn write(folder: &Path) -> Result<()> {
     let missing: Vec<_> = FILES.iter().filter(|(path, _)| !folder.join(path).exists()).collect();
     for (path, bytes) in FILES.iter().filter(|(path, _)| folder.join(path).exists()) {
         let path = folder.join(path);
         if std::fs::read(&path).ok().as_deref() != Some(*bytes) {
-            let message = "is not the sample's and would be replaced; choose another folder for the demo";
+            let message =
+                "is not a file of the sample and would be replaced; choose another folder for the demo";
             return Err(Failure::job(format!("{}: {message}", path.display())));
         }
     }

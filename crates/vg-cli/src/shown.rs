@@ -1,29 +1,29 @@
-//! Progress on a terminal, and text and numbers as people read them.
+//! Progress on a terminal, and formatting of text and numbers.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::ops::ControlFlow;
 use std::path::Path;
 use vg::progress::Progress;
 
-/// Steps of the bar of a reconstruction: finer than columns of a terminal.
+/// Steps of the progress bar of a reconstruction, more than a terminal has columns.
 const STEPS: u64 = 1000;
 
-/// What a bar of stages looks like.
+/// Template of the bar of a reconstruction.
 const STAGE: &str = "{wide_bar} {msg:9} {elapsed:>4}";
 
-/// A bar on standard error, where that is a terminal; else nothing.
+/// A progress bar on standard error, shown only on a terminal.
 pub(crate) struct Bar {
     bar: ProgressBar,
 }
 
 impl Bar {
-    /// Of one reconstruction, or of a refinement alone.
-    pub(crate) fn of_reconstruction() -> Self {
+    /// A bar for one reconstruction, or for a refinement alone.
+    pub(crate) fn for_reconstruction() -> Self {
         Self::with(STEPS, STAGE)
     }
 
-    /// Of `n` pictures.
-    pub(crate) fn of_pictures(n: usize) -> Self {
+    /// A bar for `n` pictures.
+    pub(crate) fn for_pictures(n: usize) -> Self {
         Self::with(n as u64, "{wide_bar} {pos}/{len} {elapsed:>4}")
     }
 
@@ -35,19 +35,19 @@ impl Bar {
         Self { bar }
     }
 
-    /// Where a reconstruction stands.
+    /// Shows the progress of a reconstruction.
     pub(crate) fn show(&self, progress: Progress) -> ControlFlow<()> {
         match progress.loss {
             Some(loss) => self.bar.set_message(format!("{}, loss {loss:.5}", progress.stage)),
             None => self.bar.set_message(progress.stage),
         }
         self.bar.set_position((progress.overall * STEPS as f64) as u64);
-        // Time goes on while a stage stands; no thread of its own shows that.
+        // Updates the elapsed time, because no timer thread does.
         self.bar.tick();
         ControlFlow::Continue(())
     }
 
-    /// One more picture.
+    /// Advances the bar by one picture.
     pub(crate) fn advance(&self) {
         self.bar.inc(1);
     }
@@ -59,24 +59,24 @@ impl Drop for Bar {
     }
 }
 
-/// Whether a character is nothing but text: no command to a terminal, no line break, no turn of the direction of writing.
+/// Whether a character is plain text: no terminal control, no line break, no change of the writing direction.
 pub(crate) fn is_plain(c: char) -> bool {
     let turns = matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     !(c.is_control() || turns || matches!(c, '\u{2028}' | '\u{2029}'))
 }
 
-/// Text from elsewhere on one line; characters that are not plain become escapes, `\u{1b}`.
+/// Foreign text on one line; characters that are not plain become escapes, `\u{1b}`.
 pub(crate) fn line(text: &str) -> String {
     let one = |c: char| if is_plain(c) { vec![c] } else { c.escape_default().collect() };
     text.chars().flat_map(one).collect()
 }
 
-/// A file's name on one line.
+/// A path on one line.
 pub(crate) fn path(path: &Path) -> String {
     line(&path.display().to_string())
 }
 
-/// `1 234 567`
+/// A count with grouped digits, `1 234 567`.
 pub(crate) fn count(n: usize) -> String {
     let digits = n.to_string();
     let mut out = String::new();
@@ -89,13 +89,18 @@ pub(crate) fn count(n: usize) -> String {
     out
 }
 
-/// `4.63 x 1.89 x 1.45 m`, of the lowest and the highest centre.
+/// A count with its noun, `1 view` or `2 views`.
+pub(crate) fn counted(n: usize, noun: &str) -> String {
+    format!("{} {noun}{}", count(n), if n == 1 { "" } else { "s" })
+}
+
+/// Extent between the lowest and the highest centre, `4.63 x 1.89 x 1.45 m`.
 pub(crate) fn extent((low, high): &([f32; 3], [f32; 3])) -> String {
     let [x, y, z]: [f32; 3] = std::array::from_fn(|k| high[k] - low[k]);
     format!("{x:.2} x {y:.2} x {z:.2} m")
 }
 
-/// Length, width and height with their uncertainty, where it is the same for all to a centimetre once.
+/// Length, width and height with the largest of their uncertainties.
 pub(crate) fn size(vehicle: &vg::pipeline::VehicleSize) -> String {
     let [l, w, h] = vehicle.size_m;
     let worst = vehicle.uncertainty_m.into_iter().fold(0.0, f64::max);
@@ -107,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn commands_to_a_terminal_and_turned_text_become_escapes_and_letters_stay() {
+    fn terminal_controls_and_direction_marks_are_escaped_and_letters_stay() {
         assert_eq!(line("a\u{1b}[31m\n\u{9b}\u{202e}gnp.exe"), "a\\u{1b}[31m\\n\\u{9b}\\u{202e}gnp.exe");
         assert_eq!(line("Käfer 車 🚗 \\ \""), "Käfer 車 🚗 \\ \"");
     }

@@ -49,13 +49,17 @@ fn a_runtime_that_cannot_be_used_is_said_with_what_to_install() {
 #[test]
 fn options_that_do_not_go_together_are_refused() {
     let sample = sample();
-    for arguments in [["--prior", "onnx"], ["--prior-model", "m.onnx"]] {
+    let cases = [
+        (["--prior", "onnx"], "--prior onnx needs a network: --prior-model M.onnx"),
+        (["--prior-model", "m.onnx"], "--prior-model M.onnx is used only with --prior onnx"),
+    ];
+    for (arguments, expected) in cases {
         let mut all = vec!["reconstruct", sample.to_str().unwrap(), "-o", "x.ply"];
         all.extend(arguments);
         let done = vg(&all);
         let text = String::from_utf8_lossy(&done.stderr);
         assert_eq!(done.status.code(), Some(2), "{text}");
-        assert!(text.contains("--prior onnx and --prior-model M.onnx go together"), "{text}");
+        assert!(text.contains(expected), "{text}");
     }
 }
 
@@ -155,5 +159,8 @@ fn the_program_makes_a_vehicle_of_photographs_without_masks() {
         .output()
         .unwrap();
     let error = String::from_utf8_lossy(&has_masks.stderr).into_owned();
-    assert!(has_masks.status.success() && error.contains("not opened, every view has a mask"), "{error}");
+    assert!(
+        has_masks.status.success() && error.contains("not used, because every view has a mask"),
+        "{error}"
+    );
 }

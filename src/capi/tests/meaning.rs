@@ -1,8 +1,8 @@
-//! What numbers mean on their way through the C face: each field and each enumerator against its namesake in Rust.
+//! Meaning of numbers in the C interface: each field and each enumerator is checked against its counterpart in Rust.
 //!
-//! Fields and enumerators come from the golden layout. One that has no entry here fails by name: with its entry it is
-//! said what it does. Values are all different, so that two that were exchanged are seen. What a picture shows and a
-//! measure tells is in `tests/abi/meaning.rs`.
+//! Fields and enumerators come from the golden layout. A field without an entry here fails the test by name. All values
+//! are different, so that exchanged fields are detected. Pictures and measurements are checked in
+//! `tests/abi/meaning.rs`.
 
 use super::super::report::ReportObject;
 use super::*;
@@ -29,7 +29,7 @@ fn golden_fields(of: &str) -> Vec<String> {
     fields.map(str::to_owned).collect()
 }
 
-/// Fails by name where a field of the struct has no entry, or an entry no field.
+/// Fails if a field of the struct has no entry, or an entry no field, and names it.
 #[track_caller]
 fn assert_all_checked(of: &str, checked: &[&str]) {
     let fields = golden_fields(of);
@@ -41,10 +41,10 @@ fn assert_all_checked(of: &str, checked: &[&str]) {
     }
 }
 
-/// A field of options: how a caller sets it, and what holds of what Rust is given then and not by default.
+/// A field of options: a function that sets it, and a condition on the Rust options that holds only if it is set.
 type Set<C, R> = (&'static str, fn(&mut C), fn(&R) -> bool);
 
-/// Each field has its effect, and none without being set. `elsewhere`: fields that other tests are about.
+/// Checks that each field has its effect, and only if it is set. `elsewhere`: fields that other tests check.
 #[track_caller]
 fn assert_effects<C: Copy, R>(
     of: &str,
@@ -116,7 +116,7 @@ fn each_option_of_a_reconstruction_sets_its_namesake() {
             |r| format!("{:?}", refinement(r).backend) == "Cpu",
         ),
     ];
-    // `cloud` is below; callbacks are called by the client of each release, models by the tests of networks.
+    // `cloud` is tested below, callbacks by the client of each release, and models by the tests of networks.
     let elsewhere = [
         "struct_size",
         "context",
@@ -227,7 +227,7 @@ fn each_option_of_a_model_sets_its_namesake() {
     assert_eq!(read(&initial).unwrap(), ModelOptions::default(), "the defaults are Rust's");
 }
 
-/// A report of a run that has every part, with a number of its own in each figure.
+/// A report of a run that has every part, with a different number in each figure.
 fn report() -> Report {
     static MADE: OnceLock<Report> = OnceLock::new();
     let mut report = MADE.get_or_init(made).clone();
@@ -272,7 +272,7 @@ fn reason() -> Reason {
     }
 }
 
-/// A run of the sample, as little as has every part.
+/// A run of the sample, the smallest that has every part.
 fn made() -> Report {
     let folder = vg_testing::root().join("tests/data/sedan");
     let views = Some(["000", "001"].map(str::to_owned).into());
@@ -293,7 +293,7 @@ fn made() -> Report {
     })
 }
 
-/// A number at a place of the JSON; what is true is 1.
+/// The number at a place of the JSON; `true` is 1.
 fn number(json: &Value, place: &str) -> f64 {
     let value = json.pointer(place).unwrap_or_else(|| panic!("no {place} in {json}"));
     value.as_f64().unwrap_or_else(|| f64::from(u8::from(value.as_bool().unwrap_or(!value.is_null()))))
@@ -315,7 +315,7 @@ fn each_figure_of_a_report_is_rusts_number_and_the_jsons() {
         vg_report_free(object);
         out
     };
-    /// A figure: where C has it, what it must be, and where the JSON has it; none where it says it in words.
+    /// A figure: its field in C, its value, and its place in the JSON; an empty place if the JSON has a word instead.
     type Figure = (&'static str, fn(&vg_report_figures) -> f64, f64, &'static str);
     let figures_of: [Figure; 46] = [
         ("gaussian_count", |f| f.gaussian_count as f64, 1001.0, "/gaussians"),
@@ -389,7 +389,7 @@ fn each_figure_of_a_report_is_rusts_number_and_the_jsons() {
     let checked = figures_of.iter().map(|figure| figure.0).chain(["struct_size"]);
     assert_all_checked("vg_report_figures", &checked.collect::<Vec<_>>());
 
-    // Parts that a run does not have.
+    // A run without these parts.
     let bare = Report {
         input_error: None,
         working_box: None,
@@ -405,17 +405,17 @@ fn each_figure_of_a_report_is_rusts_number_and_the_jsons() {
     assert_eq!((figures.calibration, figures.peak_rss_bytes), (vg_calibration::None as i32, 0));
 }
 
-/// Enumerators that were held against Rust.
+/// Enumerators that were checked against Rust.
 #[derive(Default)]
-struct Held(BTreeSet<String>);
+struct CheckedEnumerators(BTreeSet<String>);
 
-impl Held {
-    /// `variant` of an enumeration of C, and what Rust makes of it: of the same name but for capitals.
+impl CheckedEnumerators {
+    /// Checks that `variant` of an enumeration of C becomes the variant of Rust with the same name, ignoring case.
     #[track_caller]
-    fn namesakes(&mut self, enumeration: &str, variant: impl Debug, rust: impl Debug) {
+    fn check(&mut self, enumeration: &str, variant: impl Debug, rust: impl Debug) {
         let (variant, rust) = (format!("{variant:?}"), format!("{rust:?}"));
         let name = enumerator(enumeration, &variant);
-        // Of a variant that holds something, the name.
+        // Only the name of a variant that holds data.
         let word = rust.split([' ', '(']).next().unwrap();
         assert_eq!(word.to_lowercase(), variant.to_lowercase(), "{name}");
         self.0.insert(name);
@@ -424,14 +424,14 @@ impl Held {
 
 #[test]
 fn each_enumerator_means_its_namesake_in_rust() {
-    let mut held = Held::default();
+    let mut checked = CheckedEnumerators::default();
     let options = |set: &dyn Fn(&mut vg_options)| {
         let mut options = vg_options::initial();
         set(&mut options);
         unsafe { options.to_options() }.unwrap()
     };
     for prior in [vg_prior::Auto, vg_prior::Given, vg_prior::Hull, vg_prior::Onnx, vg_prior::Shape] {
-        held.namesakes("vg_prior", prior, options(&|o| o.prior = prior as i32).prior);
+        checked.check("vg_prior", prior, options(&|o| o.prior = prior as i32).prior);
         if prior != vg_prior::Auto {
             let name = format!("{prior:?}").to_lowercase();
             let report = Report { prior: Box::leak(name.into_boxed_str()), ..report() };
@@ -439,13 +439,13 @@ fn each_enumerator_means_its_namesake_in_rust() {
         }
     }
     for symmetry in [vg_symmetry::Auto, vg_symmetry::Always, vg_symmetry::Never, vg_symmetry::Flip] {
-        held.namesakes("vg_symmetry", symmetry, options(&|o| o.symmetry = symmetry as i32).symmetry);
+        checked.check("vg_symmetry", symmetry, options(&|o| o.symmetry = symmetry as i32).symmetry);
     }
     for calibrate in [vg_calibrate::Auto, vg_calibrate::Off] {
-        held.namesakes("vg_calibrate", calibrate, options(&|o| o.calibrate = calibrate as i32).calibrate);
+        checked.check("vg_calibrate", calibrate, options(&|o| o.calibrate = calibrate as i32).calibrate);
     }
     for relight in [vg_relight::Auto, vg_relight::Never] {
-        held.namesakes("vg_relight", relight, options(&|o| o.relight = relight as i32).relight);
+        checked.check("vg_relight", relight, options(&|o| o.relight = relight as i32).relight);
     }
     for bit in [
         vg_keep::DuplicateViews,
@@ -464,7 +464,7 @@ fn each_enumerator_means_its_namesake_in_rust() {
             .collect();
         assert_eq!(kept.len(), 1, "{bit:?}");
         assert_eq!(enumerator("vg_keep", &format!("{bit:?}")), format!("VG_KEEP_{}", kept[0].to_uppercase()));
-        held.namesakes("vg_keep", bit, bit);
+        checked.check("vg_keep", bit, bit);
     }
     for verdict in [
         pipeline::Verdict::Good,
@@ -475,14 +475,14 @@ fn each_enumerator_means_its_namesake_in_rust() {
         let found = vg_report_figures::of(&Report { verdict, ..report() }).verdict;
         let named = [vg_verdict::Good, vg_verdict::Unchecked, vg_verdict::Doubtful, vg_verdict::Bad];
         let named = named.into_iter().find(|v| *v as i32 == found).unwrap();
-        held.namesakes("vg_verdict", named, verdict);
+        checked.check("vg_verdict", named, verdict);
     }
     for stop in [Stop::Done, Stop::HeldOut, Stop::Diverged, Stop::Unseen] {
         let done = Refinement { stop, ..report().refinement.expect("an optimisation") };
         let found = vg_refinement::from(&done).stop;
         let named =
             [vg_refine_stop::Done, vg_refine_stop::HeldOut, vg_refine_stop::Diverged, vg_refine_stop::Unseen];
-        held.namesakes("vg_refine_stop", named.into_iter().find(|s| *s as i32 == found).unwrap(), stop);
+        checked.check("vg_refine_stop", named.into_iter().find(|s| *s as i32 == found).unwrap(), stop);
     }
     for verdict in [Verdict::NotNeeded, Verdict::Accepted, Verdict::Refused] {
         let mut report = report();
@@ -490,11 +490,11 @@ fn each_enumerator_means_its_namesake_in_rust() {
         let found = vg_report_figures::of(&report).calibration;
         let named = [vg_calibration::NotNeeded, vg_calibration::Accepted, vg_calibration::Refused];
         let named = named.into_iter().find(|c| *c as i32 == found).unwrap();
-        held.namesakes("vg_calibration", named, verdict);
+        checked.check("vg_calibration", named, verdict);
     }
     let none = vg_report_figures::of(&Report { calibration: None, ..report() }).calibration;
     assert_eq!(none, vg_calibration::None as i32);
-    held.namesakes("vg_calibration", vg_calibration::None, Option::<()>::None);
+    checked.check("vg_calibration", vg_calibration::None, Option::<()>::None);
 
     let drawing = |set: &dyn Fn(&mut vg_render_options)| {
         let mut options = vg_render_options::initial();
@@ -503,26 +503,26 @@ fn each_enumerator_means_its_namesake_in_rust() {
     };
     for background in [vg_background::Color, vg_background::Transparent] {
         let rust = drawing(&|o| o.background = background as i32).0.background;
-        held.namesakes("vg_background", background, rust);
+        checked.check("vg_background", background, rust);
     }
     for alpha in [vg_alpha::Straight, vg_alpha::Premultiplied] {
-        held.namesakes("vg_alpha", alpha, drawing(&|o| o.alpha = alpha as i32).1);
+        checked.check("vg_alpha", alpha, drawing(&|o| o.alpha = alpha as i32).1);
     }
     for mode in [vg_depth_mode::Expected, vg_depth_mode::Accumulated] {
-        held.namesakes("vg_depth_mode", mode, drawing(&|o| o.depth_mode = mode as i32).0.depth_mode);
+        checked.check("vg_depth_mode", mode, drawing(&|o| o.depth_mode = mode as i32).0.depth_mode);
     }
     for backend in [vg_backend::Auto, vg_backend::Cpu, vg_backend::Gpu] {
         match render::backend("backend", backend as i32) {
-            Ok(rust) => held.namesakes("vg_backend", backend, rust),
+            Ok(rust) => checked.check("vg_backend", backend, rust),
             Err(Error::NotBuilt { found, .. }) => {
-                held.namesakes("vg_backend", backend, format_args!("{}", found.trim_matches('"')));
+                checked.check("vg_backend", backend, format_args!("{}", found.trim_matches('"')));
             }
             Err(other) => panic!("{other}"),
         }
     }
     for heading in [vg_heading::Auto, vg_heading::Forward, vg_heading::Backward] {
         let options = vg_align_options { heading: heading as i32, ..vg_align_options::initial() };
-        held.namesakes("vg_heading", heading, options.heading().unwrap());
+        checked.check("vg_heading", heading, options.heading().unwrap());
     }
     for model in CameraModel::ALL {
         let named = [
@@ -535,7 +535,7 @@ fn each_enumerator_means_its_namesake_in_rust() {
             vg_camera_model::FullOpencv,
         ];
         let named = named.into_iter().find(|m| CameraModel::from_id(*m as i32) == Some(model)).unwrap();
-        held.namesakes("vg_camera_model", named, model);
+        checked.check("vg_camera_model", named, model);
     }
     let opening = |set: &dyn Fn(&mut vg_model_options)| {
         let mut options = vg_model_options::initial();
@@ -543,31 +543,31 @@ fn each_enumerator_means_its_namesake_in_rust() {
         unsafe { options.read() }.unwrap()
     };
     for provider in [vg_provider::Cpu, vg_provider::Cuda] {
-        held.namesakes("vg_provider", provider, opening(&|o| o.provider = provider as i32).provider);
+        checked.check("vg_provider", provider, opening(&|o| o.provider = provider as i32).provider);
     }
     for (prepack, rust) in
         [(vg_prepack::Auto, None), (vg_prepack::Always, Some(true)), (vg_prepack::Never, Some(false))]
     {
         assert_eq!(opening(&|o| o.prepack = prepack as i32).prepack, rust);
-        held.namesakes("vg_prepack", prepack, prepack);
+        checked.check("vg_prepack", prepack, prepack);
     }
     for error in one_of_each_error() {
-        held.namesakes("vg_status", vg_status::from(&error), error);
+        checked.check("vg_status", vg_status::from(&error), error);
     }
-    // Without an error, and of a panic, which other tests are about.
-    held.namesakes("vg_status", vg_status::Ok, message_of(|| Ok(())).0);
-    held.namesakes("vg_status", vg_status::Internal, message_of(|| panic!("made for a test")).0);
+    // Success, and a panic, which other tests check.
+    checked.check("vg_status", vg_status::Ok, message_of(|| Ok(())).0);
+    checked.check("vg_status", vg_status::Internal, message_of(|| panic!("made for a test")).0);
 
     let mut all = numbers_of_rust();
-    // tests/abi/meaning.rs, which sees what comes of them.
+    // These are checked by their effect in tests/abi/meaning.rs.
     all.retain(|line| !["VG_FORMAT_", "VG_LOG_LEVEL_"].iter().any(|prefix| line.starts_with(prefix)));
     for line in all {
         let name = line.split(' ').next().unwrap();
-        assert!(held.0.contains(name), "{name} has no entry in {}", file!());
+        assert!(checked.0.contains(name), "{name} has no entry in {}", file!());
     }
 }
 
-/// Every kind; a new one has a number of its own, which fails until it is here.
+/// One error of every kind; a new kind has a number of its own, and its absence here fails.
 fn one_of_each_error() -> Vec<Error> {
     let text = || "made for a test".to_owned();
     let all = vec![

@@ -1,4 +1,4 @@
-"""A few photographs of one side of a vehicle in, a complete metric 3D Gaussian model of it out.
+"""Makes complete metric 3D Gaussian models of vehicles from a few photographs of one side.
 
 >>> import vehicle_gaussians as vg
 >>> scene = vg.open_scene("my-car")

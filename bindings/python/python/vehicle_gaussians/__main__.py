@@ -1,4 +1,4 @@
-"""``python -m vehicle_gaussians SCENE ASSET.ply``: a scene on disk to a PLY file; prints the report as JSON."""
+"""``python -m vehicle_gaussians SCENE ASSET.ply``: reconstructs a scene to a PLY file and prints the report as JSON."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from . import VgError, __version__, open_scene, reconstruct
 
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m vehicle_gaussians", description=__doc__)
-    parser.add_argument("scene", metavar="SCENE", help="a transforms.json, a folder with one, or a COLMAP folder")
+    parser.add_argument("scene", metavar="SCENE", help="a transforms.json, a folder that holds one, or a COLMAP folder")
     parser.add_argument("asset", metavar="ASSET.ply", help="the model to write")
     parser.add_argument("--views", metavar="NAME,...", help="views to use; all if not given")
     parser.add_argument("--vehicle-from-world", metavar="FILE", help="similarity from the scene's world, JSON")
@@ -19,7 +19,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--threads", type=int, default=0, metavar="N", help="worker threads; 0 means one per core")
     parser.add_argument("--version", action="version", version=__version__)
     chosen = parser.parse_args(arguments)
-    # Whatever else has such a name is no photograph, mask or camera of the scene.
+    # Protects photographs, masks and cameras of the scene: none has a name that ends in .ply.
     if not chosen.asset.lower().endswith(".ply"):
         parser.error(f"ASSET.ply: {chosen.asset}; expected a name that ends in .ply")
     views = chosen.views.split(",") if chosen.views else None

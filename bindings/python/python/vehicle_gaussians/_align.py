@@ -29,15 +29,14 @@ def align_scan(
     threads: int = 0,
     progress: Progress | None = None,
 ) -> Alignment:
-    """The vehicle's frame by points scanned on the vehicle: their outline must run along the edges of all masks.
+    """Finds the vehicle's frame from points scanned on the vehicle, whose outline must match the edges of all masks.
 
-    masks: one for each camera, of which at least 3 are not None. cameras: with poses in the world, whose place,
-    direction and unit are anything. scan: floats (n, 3), metres, vehicle frame. sparse: (n, 3), points of the world
-    that may show anything. heading: "auto", which refuses to guess where front and back fit as well; "forward": the
-    first view by name, of those not taken from abeam, was taken from ahead of the vehicle's middle; "backward": from
-    behind.
-    names: of the views, for messages; "000", "001", ... if not given. threads: worker threads; 0 means one per core.
-    progress: as for ``reconstruct``, with the one stage "align".
+    masks: one for each camera, of which at least 3 are not None. cameras: with poses in the world, whose origin,
+    orientation and unit are arbitrary. scan: floats (n, 3), metres, vehicle frame. sparse: (n, 3), points of the world,
+    of any objects. heading: "auto", an error if front and back fit equally well; "forward": the first view by name that
+    is not seen square from the side was taken from ahead of the vehicle's centre; "backward": from behind it.
+    names: names of the views for messages; "000", "001", ... if not given. threads: worker threads; 0 means one per
+    core. progress: as for ``reconstruct``, with the single stage "align".
 
     >>> alignment = align_scan(masks, cameras_in_world, scan)  # doctest: +SKIP
     >>> scene = open_scene("my-car", vehicle_from_world=alignment.vehicle_from_world)  # doctest: +SKIP
@@ -58,11 +57,11 @@ def align_box(
     threads: int = 0,
     progress: Progress | None = None,
 ) -> Alignment:
-    """The vehicle's frame by its size and the ground; its origin is the box's middle.
+    """Finds the vehicle's frame from its size and the ground; the origin is the box's centre.
 
-    size: length, width and height, metres. sparse: points of the world, of which some show level ground around the
-    vehicle. heading: "forward" or "backward"; a box does not tell. The others are as for ``align_scan``, with masks
-    from all around.
+    size: length, width and height, metres. sparse: points of the world, some of them on level ground around the
+    vehicle. heading: "forward" or "backward", which a box does not determine. The other arguments are as for
+    ``align_scan``, with masks from all around.
 
     >>> alignment = align_box(masks, cameras_in_world, sparse, (4.6, 1.9, 1.5), heading="forward")  # doctest: +SKIP
     """
@@ -72,10 +71,10 @@ def align_box(
 
 
 def align_points(world: npt.ArrayLike, vehicle: npt.ArrayLike) -> Alignment:
-    """The similarity that takes points of the world, the cameras' centres for one, to where they were measured.
+    """Finds the similarity that maps points of the world, for example camera centres, to their measured positions.
 
-    world, vehicle: (n, 3), the same points in both frames, the second in metres; at least 3, not on one line. Of 6 and
-    more, those that contradict the others are left out.
+    world, vehicle: (n, 3), the same points in both frames, the second in metres; at least 3, not on one line. With 6 or
+    more points, outliers are left out.
 
     >>> alignment = align_points(world=np.eye(3), vehicle=2 * np.eye(3))
     >>> round(alignment.scale, 6)
@@ -92,9 +91,9 @@ def align_folder(
     threads: int = 0,
     progress: Progress | None = None,
 ) -> Alignment:
-    """``align_scan`` with the files of a scene: a COLMAP folder, one of 3DRealCar, or a ``transforms.json``.
+    """Runs ``align_scan`` on the files of a scene: a COLMAP folder, one of 3DRealCar, or a ``transforms.json``.
 
-    scan: a PLY file of points, metres, vehicle frame; the scan in a folder of 3DRealCar if not given.
+    scan: a PLY file of points, metres, vehicle frame; if not given, the scan in a folder of 3DRealCar.
 
     >>> alignment = align_folder("3drealcar/2024_06_04_13_44_39")  # doctest: +SKIP
     """

@@ -1,4 +1,4 @@
-"""What an alignment comes back as."""
+"""Result of an alignment."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ class Alignment(NamedTuple):
     scale: float
     """Metres per unit of the world."""
     residual_m: float
-    """Typical distance of what should coincide, metres."""
+    """Typical distance between things that should coincide, metres."""
     confidence: float
-    """0 to 1; at 0 another answer fits as well."""
+    """0 to 1; 0 if another solution fits equally well."""
     residual_px: float | None
     """Mean distance between the outlines of scan and masks, pixels; None without a scan."""
     other_px: float | None
     """That distance with front and back exchanged."""
     used_count: int
-    """Views, or points, that the similarity was found from."""
+    """Number of views, or points, that the similarity was found from."""
     kept: npt.NDArray[np.bool_] | None = None
-    """Which points were used, bool (n,); None where there were none to choose from."""
+    """Which points were used, bool (n,); None for alignments without point pairs."""
     residuals_m: npt.NDArray[np.float64] | None = None
-    """How far each point ends from its place, float64 (n,)."""
+    """Distance of each mapped point from its measured position, metres, float64 (n,)."""

@@ -1,4 +1,4 @@
-"""Arguments as Python hands them in: the error of one that cannot be taken names it, by either face."""
+"""Conversion of Python arguments, with errors that name the argument, for both interfaces."""
 
 from __future__ import annotations
 
@@ -59,8 +59,8 @@ def real(number: Any, argument: str) -> float:
 
 
 def floats(array: Any, argument: str, allowed: str) -> npt.NDArray[np.float32]:
-    """An array of float32. Floats of any precision are rounded; whole numbers are not taken from an array, where they
-    are often of another unit, but from a list."""
+    """An array of float32. Floats of any precision are rounded. Whole numbers are accepted in a list but not in an
+    array, where they often have another unit."""
     try:
         found = np.asarray(array)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Fields of tuples with docstrings of their own, which ``help`` shows as editors do."""
+"""Docstrings of the fields of tuples, for ``help`` and editors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 
 def documented(cls: type[T]) -> type[T]:
-    """Gives the fields of a named tuple the strings that follow them in the source."""
+    """Sets the docstrings of a named tuple's fields to the strings that follow them in the source."""
     for field, text in field_texts(cls).items():
         getattr(cls, field).__doc__ = text
     return cls
@@ -32,13 +32,13 @@ def _texts(module: str) -> dict[str, dict[str, str]]:
     try:
         tree = ast.parse(inspect.getsource(sys.modules[module]))
     except OSError:
-        # Without sources there are names and types.
+        # Without sources, the fields have names and types only.
         return {}
     found: dict[str, dict[str, str]] = {}
     for cls in tree.body:
         if isinstance(cls, ast.ClassDef):
-            for field, text in zip(cls.body, cls.body[1:], strict=False):
-                match field, text:
-                    case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(said))):
-                        found.setdefault(cls.name, {})[name] = inspect.cleandoc(said)
+            for field, string in zip(cls.body, cls.body[1:], strict=False):
+                match field, string:
+                    case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
+                        found.setdefault(cls.name, {})[name] = inspect.cleandoc(text)
     return found

@@ -1,4 +1,4 @@
-"""Equality of what holds arrays, where NumPy's own answer is another array."""
+"""Equality of objects that hold arrays, because NumPy's ``==`` returns an array."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 
 def equal_by_value(cls: type[T]) -> type[T]:
-    """Makes objects of a class equal to others of it that hold the same values; a tuple also to one without a class."""
+    """Makes objects of a class equal if they hold the same values; a named tuple also equals a plain tuple."""
 
     def parts(thing: Any) -> tuple[Any, ...]:
         return tuple(thing) if isinstance(thing, tuple) else tuple(vars(thing).values())

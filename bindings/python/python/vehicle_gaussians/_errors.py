@@ -1,4 +1,4 @@
-"""What goes wrong, with the numbers of the C library, as classes that are Python's own too."""
+"""Errors with the status codes of the C library, as subclasses of Python's own exceptions."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import re
 
 
 class Status(enum.IntEnum):
-    """Why a call did not do what it was asked. The numbers are those of ``include/vg.h`` and do not change."""
+    """Status codes of failed calls. The numbers are those of ``include/vg.h`` and do not change."""
 
     OK = 0
     #: An argument is outside what the function accepts.
     ARGUMENT = 1
-    #: A file's content is not what its format promises.
+    #: The contents of a file are invalid for its format.
     FORMAT = 2
     #: The operating system refused a file operation.
     IO = 3
@@ -25,24 +25,24 @@ class Status(enum.IntEnum):
     NOT_BUILT = 6
     #: A defect of the library.
     INTERNAL = 7
-    #: Something is needed that this machine does not have.
+    #: A resource is missing on this machine.
     MISSING = 8
-    #: The operating system did not start the threads that were asked for.
+    #: The operating system did not start the requested threads.
     THREADS = 9
 
 
 class VgError(Exception):
-    """What the library says when it cannot: which argument or file, what was found, what is allowed.
+    """Base class of the library's errors. The message names the argument or file, what was found, what is allowed.
 
-    ``VgError(code, message)`` makes the subclass of the code, which is also the Python exception that such a failure
-    usually is:
+    ``VgError(code, message)`` makes an object of the code's subclass, which also derives from the matching Python
+    exception:
 
     >>> isinstance(VgError(Status.ARGUMENT, "threads: -1; allowed: 0 (all cores) to 1024"), ValueError)
     True
     """
 
     code: Status
-    """Which kind of failure."""
+    """Kind of failure."""
 
     def __new__(cls, code: int, message: str) -> VgError:
         made = _class_of(code, message) if cls is VgError else cls
@@ -50,7 +50,7 @@ class VgError(Exception):
 
     def __init__(self, code: int, message: str) -> None:
         super().__init__(message)
-        # A library newer than this file may know more.
+        # A newer library may have more codes.
         self.code = Status(code) if code in list(Status) else Status.INTERNAL
 
     def __str__(self) -> str:
@@ -69,12 +69,12 @@ class ArgumentTypeError(VgError, TypeError):
 
 
 class FormatError(VgError, ValueError):
-    """A file's content is not what its format promises (FORMAT)."""
+    """The contents of a file are invalid for its format (FORMAT)."""
 
 
 class FileError(VgError, OSError):
-    """The operating system refused a file operation (IO); ``errno``, ``strerror`` and ``filename`` are the system's, where
-    it was its own refusal."""
+    """The operating system refused a file operation (IO); ``errno``, ``strerror`` and ``filename`` are set if the
+    system reported an error number."""
 
     def __init__(self, code: int, message: str) -> None:
         super().__init__(code, message)
@@ -86,11 +86,11 @@ class FileError(VgError, OSError):
 
 
 class FileMissingError(FileError, FileNotFoundError):
-    """A file or a folder is not there (IO)."""
+    """A file or a folder does not exist (IO)."""
 
 
 class FileForbiddenError(FileError, PermissionError):
-    """A file or a folder may not be read or written (IO)."""
+    """A file or a folder is not readable or not writable (IO)."""
 
 
 class ReconstructionError(VgError, RuntimeError):
@@ -110,11 +110,11 @@ class InternalError(VgError, RuntimeError):
 
 
 class MissingError(VgError, RuntimeError):
-    """Something is needed that this machine does not have (MISSING)."""
+    """A resource is missing on this machine (MISSING)."""
 
 
 class ThreadsError(VgError, RuntimeError):
-    """The system does not start the threads that were asked for (THREADS)."""
+    """The operating system did not start the requested threads (THREADS)."""
 
 
 _CLASSES: dict[int, type[VgError]] = {
@@ -132,7 +132,7 @@ _CLASSES: dict[int, type[VgError]] = {
 def _class_of(code: int, message: str) -> type[VgError]:
     if code != Status.IO:
         return _CLASSES.get(code, VgError if code in list(Status) else InternalError)
-    # Python knows which numbers mean what.
+    # OSError maps the number to its subclass.
     of_system = type(OSError(_errno(message), ""))
     named: dict[type[OSError], type[FileError]] = {
         FileNotFoundError: FileMissingError,
@@ -142,6 +142,6 @@ def _class_of(code: int, message: str) -> type[VgError]:
 
 
 def _errno(message: str) -> int | None:
-    """The system's number, which ends its words: "no.ply: No such file or directory (os error 2)"."""
+    """The system's error number at the end of a message: "no.ply: No such file or directory (os error 2)"."""
     found = re.search(r"\(os error (\d+)\)", message)
     return int(found.group(1)) if found else None

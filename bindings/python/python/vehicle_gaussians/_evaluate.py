@@ -12,7 +12,7 @@ from ._documented import documented
 from ._errors import Status, VgError
 from ._measures import ViewErrors
 from ._metrics import view_errors
-from ._progress import Progress, teller
+from ._progress import Progress, wrapped
 from ._scene import Scene, open_scene
 
 if TYPE_CHECKING:
@@ -21,18 +21,18 @@ if TYPE_CHECKING:
 
 @documented
 class ViewScore(NamedTuple):
-    """A row of the table that ``evaluate`` makes; None where a measure does not exist."""
+    """A row of the table that ``evaluate`` returns; None where a measure is not defined."""
 
     name: str
     """The view's name."""
     psnr_db: float
     """Peak signal-to-noise ratio over the full frame, dB."""
     psnr_box_db: float | None
-    """The same inside the bounding box of the mask; None where the mask is empty."""
+    """Peak signal-to-noise ratio inside the bounding box of the mask, dB; None where the mask is empty."""
     ssim: float | None
     """Structural similarity over the full frame, at most 1; None for a picture smaller than 11x11."""
     lpips: float | None
-    """None without a model that measures it, and for a picture smaller than 64x64."""
+    """Perceptual distance LPIPS; None without a model for it, and for a picture smaller than 64x64."""
     silhouette_iou: float
     """Intersection over union of the mask and the pixels that the model covers by half or more."""
     depth_mae_m: float | None
@@ -51,11 +51,11 @@ def evaluate(
     threads: int = 0,
     progress: Progress | None = None,
 ) -> list[ViewScore]:
-    """The errors of a model, drawn on white, in every view of a scene, one row a view.
+    """Measures the errors of a model, drawn on white, in every view of a scene; returns one row for each view.
 
-    scene: of ``open_scene``, or the path that it takes, with ``views`` and ``vehicle_from_world``.
-    lpips: the network that measures LPIPS. threads: worker threads; 0 means one per core.
-    progress: as for ``reconstruct``, with the one stage "measure".
+    scene: from ``open_scene``, or a path for it, with ``views`` and ``vehicle_from_world``.
+    lpips: a network that measures LPIPS. threads: worker threads; 0 means one per core.
+    progress: as for ``reconstruct``, with the single stage "measure".
 
     ``pandas.DataFrame(rows)`` has the names of the fields as its columns.
 
@@ -70,13 +70,13 @@ def evaluate(
 
 
 def rows(scene: Any, errors: Callable[..., ViewErrors], progress: Progress | None) -> list[ViewScore]:
-    """A row for each view, by the function that measures image, mask, camera and depth."""
-    tell = None if progress is None else teller(progress)
+    """Makes a row for each view; ``errors`` measures image, mask, camera and depth."""
+    report = None if progress is None else wrapped(progress)
     columns = (scene.names, scene.images, scene.masks, scene.cameras, scene.depths)
     table: list[ViewScore] = []
     for name, *view in zip(*columns, strict=True):
         table.append(ViewScore(name, *errors(*view)))
         part = len(table) / len(scene.names)
-        if tell is not None and not tell("measure", part, part):
+        if report is not None and not report("measure", part, part):
             raise VgError(Status.CANCELLED, "cancelled during measure")
     return table

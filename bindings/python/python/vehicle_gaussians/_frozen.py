@@ -11,15 +11,15 @@ import numpy.typing as npt
 class FrozenArray(np.ndarray[Any, Any]):
     """A read-only view of the library's memory, which it keeps alive.
 
-    DLPack's readers may pass over the flag that says so: they are given a copy, and refused one that must not be.
-    What is computed from it, copied or pickled, is an ordinary array.
+    Consumers of DLPack may ignore the read-only flag, so they get a copy; a request without a copy is an error.
+    Results of computations, copies and pickles are ordinary arrays.
     """
 
     def __dlpack__(self, **how: Any) -> Any:
         if self.flags.writeable or how.get("copy"):
             return np.asarray(self).__dlpack__(**how)
         if how.pop("copy", None) is False:
-            raise BufferError("read-only memory of vehicle_gaussians is not handed out without a copy: copy=None")
+            raise BufferError("copy=False: read-only memory of vehicle_gaussians is exported as a copy; use copy=None")
         return np.array(self).__dlpack__(**how)
 
     def __array_wrap__(self, array: npt.NDArray[Any], context: Any = None, return_scalar: bool = False) -> Any:

@@ -1,4 +1,4 @@
-"""What measures come back as."""
+"""Results of measurements."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from ._documented import documented
 
 @documented
 class PictureErrors(NamedTuple):
-    """The difference of two pictures; None where a measure does not exist."""
+    """The difference of two pictures; None where a measure is not defined."""
 
     psnr_db: float
     """Peak signal-to-noise ratio, dB; infinite for equal pictures."""
     ssim: float | None
     """Structural similarity, at most 1; None for a picture smaller than 11x11."""
     lpips: float | None
-    """None without a model that measures it, and for a picture smaller than 64x64."""
+    """Perceptual distance LPIPS; None without a model for it, and for a picture smaller than 64x64."""
 
 
 @documented
 class ViewErrors(NamedTuple):
-    """The error of a model in one photograph; None where a measure does not exist."""
+    """The error of a model in one photograph; None where a measure is not defined."""
 
     psnr_db: float
     """Peak signal-to-noise ratio over the full frame, dB."""
@@ -30,7 +30,7 @@ class ViewErrors(NamedTuple):
     ssim: float | None
     """Structural similarity over the full frame, at most 1; None for a picture smaller than 11x11."""
     lpips: float | None
-    """None without a model that measures it, and for a picture smaller than 64x64."""
+    """Perceptual distance LPIPS; None without a model for it, and for a picture smaller than 64x64."""
     silhouette_iou: float
     """Intersection over union of the mask and the pixels that the model covers by half or more."""
     depth_mae_m: float | None
@@ -46,18 +46,18 @@ class SurfaceErrors(NamedTuple):
     accuracy_m: float
     """Mean distance from the model's surface to the scan, metres; distances above 0.5 m count as 0.5 m."""
     completeness_m: float
-    """Mean distance from the scan to the model's surface, metres, likewise."""
+    """Mean distance from the scan to the model's surface, metres; distances above 0.5 m count as 0.5 m."""
     chamfer_m: float
-    """Mean of the two."""
+    """Mean of accuracy_m and completeness_m."""
     precision: float
-    """Share of the model's surface that is nearer to the scan than the threshold."""
+    """Fraction of the model's surface that is nearer to the scan than the threshold."""
     recall: float
-    """Share of the scan that is nearer to the model's surface than the threshold."""
+    """Fraction of the scan that is nearer to the model's surface than the threshold."""
     f_score: float
-    """Harmonic mean of the two."""
+    """Harmonic mean of precision and recall."""
     length_error_percent: float
-    """How much longer (x) the model is than the scan, percent; negative: shorter."""
+    """Error of the model's length (x) against the scan, percent; negative: shorter."""
     width_error_percent: float
-    """How much wider (y) it is, percent."""
+    """Error of its width (y), percent."""
     height_error_percent: float
-    """How much higher (z) it is, percent."""
+    """Error of its height (z), percent."""

@@ -1,4 +1,4 @@
-"""How far a model is from photographs and from a scan."""
+"""Errors of a model against photographs and against a scan."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ def picture_errors(
     lpips: Model | None = None,
     threads: int = 0,
 ) -> PictureErrors:
-    """The difference of two pictures of one size, uint8 or floats in [0, 1], (height, width, 3 or 4).
+    """Measures the difference of two pictures of one size, uint8 or floats in [0, 1], (height, width, 3 or 4).
 
-    What their alpha leaves open is white. data_range: what white is in both, where it is not 255 in bytes and 1 in
-    floats; floats that are more than 1 beyond their range are an error, since clamped they would be equal.
-    lpips: the network that measures LPIPS, made by ``python -m vehicle_gaussians.export.lpips``.
+    Transparent parts are composited on white. data_range: the value of white in both, if it is not 255 in bytes or 1 in
+    floats; floats that are more than 1 beyond their range are an error, because clamping would make them equal.
+    lpips: a network that measures LPIPS, made by ``python -m vehicle_gaussians.export.lpips``.
     threads: worker threads; 0 means one per core.
 
     >>> picture_errors(image, image).psnr_db
@@ -47,7 +47,7 @@ def view_errors(
     lpips: Model | None = None,
     threads: int = 0,
 ) -> ViewErrors:
-    """The error of a model, drawn on white, in one photograph, which its mask puts on white.
+    """Measures the error of a model, drawn on white, against one photograph, which its mask composites on white.
 
     The picture, mask, camera and depth are as for ``reconstruct``; lpips and threads as for ``picture_errors``.
 
@@ -58,9 +58,9 @@ def view_errors(
 
 
 def surface_errors(gaussians: Gaussians, points: Floats, *, f_score: float = 0.05, threads: int = 0) -> SurfaceErrors:
-    """The error of a model's surface against points measured on the vehicle: floats (n, 3), metres, its frame.
+    """Measures the error of a model's surface against points on the vehicle: floats (n, 3), metres, its frame.
 
-    f_score: the distance below which a point counts as met, metres. threads: as for ``picture_errors``.
+    f_score: the distance below which a point counts as correct, metres. threads: as for ``picture_errors``.
 
     >>> surface_errors(car, scan).accuracy_m < 0.1
     True

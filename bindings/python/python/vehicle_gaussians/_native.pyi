@@ -41,7 +41,7 @@ __version__: str
 
 @final
 class Camera:
-    """A posed camera. It does not change: methods return new ones.
+    """An immutable posed camera: methods return new cameras.
 
     >>> K = [[600, 0, 320], [0, 600, 240], [0, 0, 1]]
     >>> camera = Camera.from_matrix(K, vehicle_from_camera, width=640, height=480)
@@ -55,7 +55,7 @@ class Camera:
         params: npt.ArrayLike,
         vehicle_from_camera: npt.ArrayLike,
     ) -> Camera:
-        """From a COLMAP camera model, by name or number, and its parameters in COLMAP's order.
+        """Makes a camera from a COLMAP camera model, by name or number, and its parameters in COLMAP's order.
 
         vehicle_from_camera is a 3x4 or 4x4 rigid transform in metres; camera axes are x right, y down, z forward.
 
@@ -71,9 +71,9 @@ class Camera:
         height: SupportsIndex,
         distortion: npt.ArrayLike | None = None,
     ) -> Camera:
-        """From a 3x3 matrix K of focal lengths and principal point in pixels, without skew.
+        """Makes a camera from a 3x3 matrix K of focal lengths and principal point in pixels, without skew.
 
-        The centre of the top-left pixel is (0.5, 0.5), as in COLMAP: a principal point in the middle is width / 2. For
+        The centre of the top-left pixel is (0.5, 0.5), as in COLMAP: a principal point in the centre is width / 2. For
         the K of OpenCV's calibration use from_opencv. distortion is k1, k2, p1, p2[, k3[, k4, k5, k6]].
 
             >>> camera = Camera.from_matrix([[600, 0, 320], [0, 600, 240], [0, 0, 1]], vehicle_from_camera, 640, 480)
@@ -91,12 +91,12 @@ class Camera:
         tvec: npt.ArrayLike | None = None,
         vehicle_from_world: npt.ArrayLike | None = None,
     ) -> Camera:
-        """From OpenCV's calibration, which puts the centre of the top-left pixel at (0, 0): half a pixel is added to the
-        principal point.
+        """Makes a camera from OpenCV's calibration. OpenCV has the centre of the top-left pixel at (0, 0), so half a pixel
+        is added to the principal point.
 
-        distortion is that of cv2.calibrateCamera or, with fisheye=True, of cv2.fisheye. Instead of the pose, rvec and tvec
-        as cv2.solvePnP and cv2.calibrateCamera return them, from the world of the object's points; without
-        vehicle_from_world, a 4x4 similarity, that world is the vehicle's frame.
+        distortion is that of cv2.calibrateCamera or, with fisheye=True, of cv2.fisheye. rvec and tvec replace the pose,
+        as cv2.solvePnP and cv2.calibrateCamera return them, from the world of the object's points. vehicle_from_world
+        is a 4x4 similarity; without it, that world is the vehicle's frame.
 
             >>> K = [[600, 0, 319.5], [0, 600, 239.5], [0, 0, 1]]
             >>> camera = Camera.from_opencv(K, vehicle_from_camera, 640, 480)
@@ -115,8 +115,9 @@ class Camera:
         fov_y_degrees: float = 35.0,
         up: npt.ArrayLike = (0.0, 0.0, 1.0),
     ) -> Camera:
-        """A pinhole camera at eye, a point of the vehicle's frame in metres, whose optical axis meets target. Its picture
-        shows fov_y_degrees from top to bottom, and up is up in it. For another lens: with_pose.
+        """Makes a pinhole camera at eye, a point of the vehicle's frame in metres, whose optical axis goes through target.
+        Its picture shows fov_y_degrees from top to bottom, and the direction up points up. For another lens use
+        with_pose.
 
             >>> camera = Camera.look_at((6, -4, 1.5), (0, 0, 0.7), 640, 480)
             >>> camera.project([[0, 0, 0.7]]).round(6)
@@ -124,10 +125,10 @@ class Camera:
         """
     @overload
     def project(self, points: npt.ArrayLike, depth: Literal[False] = False) -> npt.NDArray[np.float64]:
-        """The pixels (n, 2), column and row, of points (n, 3) of the vehicle's frame, metres; with depth=True a pair of them
-        and the depths (n,) along the optical axis, metres. NaN where the camera has no picture of a point: behind it, and
-        beyond the angle at which its lens folds back. The centre of the top-left pixel is (0.5, 0.5); pixels outside 0 to
-        width and 0 to height lie beside the picture.
+        """Projects points (n, 3) of the vehicle's frame, metres, to pixels (n, 2), column and row; with depth=True returns
+        a pair of the pixels and the depths (n,) along the optical axis, metres. NaN where the camera does not see a
+        point: behind it, and beyond the angle at which its lens folds back. The centre of the top-left pixel is (0.5,
+        0.5); pixels beyond 0 to width and 0 to height are outside the picture.
 
             >>> pixels, depths = camera.project(car.means, depth=True)
         """
@@ -136,13 +137,14 @@ class Camera:
         self, points: npt.ArrayLike, depth: Literal[True]
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
     def unproject(self, pixels: npt.ArrayLike, depths: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """The points (n, 3) of the vehicle's frame, metres, behind pixels (n, 2), column and row, at depths (n,) along the
-        optical axis, metres. NaN where a depth is no measurement (0, negative, NaN), and where the lens has no ray.
+        """Returns the points (n, 3) of the vehicle's frame, metres, behind pixels (n, 2), column and row, at depths (n,)
+        along the optical axis, metres. NaN where a depth is no measurement (0, negative, NaN), and where the lens
+        defines no ray.
 
             >>> point = camera.unproject([[320.0, 240.0]], [6.0])
         """
     def scaled(self, width: SupportsIndex, height: SupportsIndex) -> Camera:
-        """The same camera for pictures resized to width x height.
+        """The camera for pictures resized to width x height.
 
         >>> half = camera.scaled(camera.width // 2, camera.height // 2)
         """
@@ -152,22 +154,22 @@ class Camera:
         >>> part = camera.cropped(x=100, y=50, width=64, height=32)  # of image[50:82, 100:164]
         """
     def with_pose(self, vehicle_from_camera: npt.ArrayLike) -> Camera:
-        """The same camera, lens included, in another place.
+        """The camera, including its lens, at another pose.
 
         >>> moved = camera.with_pose(other_vehicle_from_camera)
         """
     @property
     def width(self) -> int:
-        """Columns."""
+        """Width of the picture, pixels."""
     @property
     def height(self) -> int:
-        """Rows."""
+        """Height of the picture, pixels."""
     @property
     def K(self) -> npt.NDArray[np.float64]:
-        """3x3; the centre of the top-left pixel is (0.5, 0.5)."""
+        """Camera matrix, 3x3; the centre of the top-left pixel is (0.5, 0.5)."""
     @property
     def vehicle_from_camera(self) -> npt.NDArray[np.float64]:
-        """4x4, metres."""
+        """Pose, 4x4, metres."""
     @property
     def model(self) -> Literal["PINHOLE", "OPENCV", "FULL_OPENCV", "OPENCV_FISHEYE"]:
         """The COLMAP model that holds this lens: PINHOLE, OPENCV, FULL_OPENCV or OPENCV_FISHEYE."""
@@ -182,9 +184,9 @@ class Camera:
 
 @final
 class Renderer:
-    """Gaussians made ready to be drawn many times. backend is "auto", a graphics processor where this build and this
-    machine have one and there are 20,000 Gaussians or more, else the CPU; "cpu"; or "gpu", an error without. Under
-    "auto" the CPU goes on should the device fail.
+    """Gaussians prepared for rendering many times. backend is "auto", a GPU if this build and this machine have one
+    and there are 20,000 Gaussians or more, else the CPU; "cpu"; or "gpu", an error if there is none. With "auto"
+    the CPU takes over if the GPU fails.
 
         >>> ready = Renderer(car, "cpu")
         >>> pictures = [ready.render(camera) for camera in cameras]
@@ -192,10 +194,10 @@ class Renderer:
     def __new__(cls, gaussians: Gaussians, backend: Backend = "auto") -> Renderer: ...
     @property
     def backend(self) -> Literal["cpu", "gpu"]:
-        """Who draws: "cpu" or "gpu"."""
+        """The renderer that was chosen: "cpu" or "gpu"."""
     @property
     def choice(self) -> str:
-        """Who draws, and why."""
+        """The renderer that was chosen, and why."""
     def render(
         self,
         camera: Camera,
@@ -207,7 +209,7 @@ class Renderer:
         far: float = 1e10,
         sh_degree: int = 3,
     ) -> npt.NDArray[np.uint8]:
-        """The picture a camera takes: uint8 (height, width, 3), or (height, width, 4) with straight alpha on a
+        """Renders a camera's picture: uint8 (height, width, 3), or (height, width, 4) with straight alpha on a
         "transparent" background. Arguments are those of Gaussians.render.
 
             >>> picture = Renderer(car).render(camera, "transparent")
@@ -224,16 +226,16 @@ class Renderer:
         sh_degree: int = 3,
         progress: Progress | None = None,
     ) -> list[npt.NDArray[np.uint8]]:
-        """The pictures of several cameras, a list of what render gives. A graphics processor draws one while the picture
-        before it is copied. progress is as for reconstruct, with the one stage "render".
+        """Renders the pictures of several cameras; returns a list of the results of render. A GPU draws a picture while
+        the previous one is copied. progress is as for reconstruct, with the single stage "render".
 
             >>> pictures = Renderer(car).render_many(cameras)
         """
 
 @final
 class Gaussians:
-    """The Gaussians of a vehicle, in its frame (x forward, y left, z up, metres). They do not change: methods return
-    new ones, and the arrays are read-only views that keep them alive.
+    """The Gaussians of a vehicle, in its frame (x forward, y left, z up, metres). They are immutable: methods return
+    new Gaussians, and the arrays are read-only views that keep them alive.
 
         >>> car = Gaussians.load_ply("car.ply")
         >>> picture = car.render(camera)
@@ -243,7 +245,7 @@ class Gaussians:
     """
     @staticmethod
     def from_arrays(means: Floats, scales: Floats, quats: Floats, opacities: Floats, sh: Floats) -> Gaussians:
-        """From arrays of floats, of n Gaussians: means (n, 3) and scales (n, 3), standard deviations, in metres; quats
+        """Makes n Gaussians from arrays of floats: means (n, 3) and scales (n, 3), standard deviations, in metres; quats
         (n, 4) as (w, x, y, z) of any norm; opacities (n,) from 0 to 1; sh (n, (degree + 1)^2, 3).
 
             >>> means, scales, quats = np.zeros((2, 3)), np.full((2, 3), 0.1), np.tile([1.0, 0, 0, 0], (2, 1))
@@ -257,19 +259,19 @@ class Gaussians:
         >>> car = Gaussians.load_ply("car.ply")
         """
     def save_ply(self, path: str | PathLike[str]) -> None:
-        """Writes a PLY file in the layout of 3D Gaussian Splatting. A file that is there is replaced only once the new
-        one is complete.
+        """Writes a PLY file in the layout of 3D Gaussian Splatting. An existing file is replaced only after the new one is
+        complete.
 
             >>> car.save_ply("copy.ply")
         """
     @staticmethod
     def from_ply_bytes(data: bytes | bytearray | memoryview) -> Gaussians:
-        """From the bytes of a PLY file in the layout of 3D Gaussian Splatting.
+        """Reads the bytes of a PLY file in the layout of 3D Gaussian Splatting.
 
         >>> same = Gaussians.from_ply_bytes(car.to_ply_bytes())
         """
     def to_ply_bytes(self) -> bytes:
-        """What save_ply writes, as bytes.
+        """Returns the bytes that save_ply writes.
 
         >>> car.to_ply_bytes()[:4]
         b'ply\n'
@@ -278,8 +280,8 @@ class Gaussians:
         self, index: slice | Sequence[int] | Sequence[bool] | npt.NDArray[np.integer[Any] | np.bool_], /
     ) -> Gaussians: ...
     def cropped(self, low: npt.ArrayLike, high: npt.ArrayLike) -> Gaussians:
-        """Those whose centre lies in the box from low to high, three numbers each, metres, its faces included. Infinite sides
-        are open.
+        """The Gaussians whose centre lies in the box from low to high, three numbers each, metres, including its faces.
+        Infinite sides are open.
 
             >>> front = car.cropped((0, -10, -10), (10, 10, 10))
         """
@@ -297,7 +299,7 @@ class Gaussians:
         elevation_degrees: float = 12.0,
         fov_y_degrees: float = 35.0,
     ) -> list[Camera]:
-        """count cameras on a circle around the vehicle, from its front towards its left, each with all of it in its picture.
+        """Returns count cameras on a circle around the vehicle, from its front to its left, each with all of it in view.
 
         >>> pictures = Renderer(car).render_many(car.turntable(36, 320, 240))
         """
@@ -308,13 +310,13 @@ class Gaussians:
         True
         """
     def transformed(self, to_from_vehicle: npt.ArrayLike) -> Gaussians:
-        """These in another frame: to_from_vehicle is a 4x4 similarity. Colours turn with the vehicle. Coordinates must stay
-        below 16384 m, where a float32 still holds a millimetre.
+        """The Gaussians in another frame: to_from_vehicle is a 4x4 similarity. Colours turn with the vehicle. Coordinates
+        must stay below 16384 m, where a float32 still resolves a millimetre.
 
             >>> twice_as_large = car.transformed(np.diag([2.0, 2.0, 2.0, 1.0]))
         """
     def merged(self, other: Gaussians) -> Gaussians:
-        """These, then those of other, at the higher of their degrees of spherical harmonics.
+        """These Gaussians followed by those of other, at the higher of their degrees of spherical harmonics.
 
         >>> both = car.merged(car.mirrored())
         >>> len(both) == 2 * len(car)
@@ -334,12 +336,12 @@ class Gaussians:
         far: float = 1e10,
         sh_degree: int = 3,
     ) -> npt.NDArray[np.uint8]:
-        """The picture a camera takes: uint8 (height, width, 3), or (height, width, 4) with straight alpha on a
-        "transparent" background. With dtype float32 colours are not clamped above 1. With depth=True a pair of the
-        picture and its depth in metres, float32 (height, width), 0 where there is nothing.
+        """Renders a camera's picture: uint8 (height, width, 3), or (height, width, 4) with straight alpha on a
+        "transparent" background. With dtype float32 colours are not clamped above 1. With depth=True returns a pair of
+        the picture and its depth in metres, float32 (height, width), 0 where there is no Gaussian.
 
-        background is "white", "black", "transparent" or (r, g, b) from 0 to 1; near and far are metres; sh_degree leaves
-        out the colour's bands above it; threads=0 means one per core.
+        background is "white", "black", "transparent" or (r, g, b) from 0 to 1; near and far are metres; bands of the
+        colour above sh_degree are left out; threads=0 means one per core.
 
             >>> picture = car.render(camera)
             >>> rgba, depth = car.render(camera, "transparent", depth=True)
@@ -455,10 +457,10 @@ class Gaussians:
         depth_mode: DepthMode = "expected",
         backend: Backend = "auto",
     ) -> Planes:
-        """The picture as losses look at it: Planes of color (height, width, 3), over the background or, with a
-        "transparent" one, premultiplied; alpha and depth (height, width). All float32; arguments as those of render,
-        and depth_mode, "expected" or "accumulated": depth times alpha. backend is "cpu", "gpu", an error without, or
-        "auto", the CPU: Renderer is for Gaussians that are drawn many times.
+        """Renders a picture for use in a loss: Planes of color (height, width, 3), over the background or, with a
+        "transparent" one, premultiplied; alpha and depth (height, width). All are float32. Arguments are those of
+        render, and depth_mode, "expected" or "accumulated" (depth times alpha). backend is "cpu", "gpu" (an error if
+        there is none), or "auto", the CPU; to draw the same Gaussians many times, use Renderer.
 
             >>> color, alpha, depth = car.render_planes(camera, "black")
         """
@@ -478,11 +480,12 @@ class Gaussians:
         depth_mode: DepthMode = "expected",
         backend: Backend = "auto",
     ) -> Gradients:
-        """Goes back from the gradient of a loss with respect to the planes of a picture, as render_planes draws it, to
-        Gradients of everything the picture is made of. color (height, width, 3), alpha and depth (height, width) are
-        float32, finite; None where the loss does not look. The picture is drawn again on the way.
+        """Propagates the gradient of a loss with respect to the planes of a picture, as drawn by render_planes, back to
+        Gradients of all its inputs. color (height, width, 3), alpha and depth (height, width) are float32 and finite;
+        None where the loss does not use the plane. The picture is rendered again for that.
 
-        Constants are the order of depth, the pixels a Gaussian reaches, what is too faint to be drawn, near and far.
+        Treated as constant are the depth order, the pixels that a Gaussian reaches, the cut of faint Gaussians, near
+        and far.
 
             >>> planes = car.render_planes(camera)
             >>> gradients = car.render_backward(camera, color=2 * (planes.color - photograph))
@@ -523,8 +526,8 @@ class Gaussians:
 class Model:
     """A network in an ONNX file, opened by ONNX Runtime, for reconstruct's prior_model and head_model.
 
-    It is opened once and may be used by any number of threads at a time; runs of it take turns. It holds its weights
-    and threads until nobody refers to it any more. Not for a forked process.
+    It is opened once and may be used by any number of threads at a time; its runs are serialised. It keeps its
+    weights and threads until it is garbage-collected. It cannot be used in a forked process.
 
         >>> network = Model("depth.onnx")  # doctest: +SKIP
         >>> made = reconstruct(images, masks, cameras, prior="onnx", prior_model=network)  # doctest: +SKIP
@@ -541,26 +544,27 @@ class Model:
     ) -> Model: ...
     @property
     def path(self) -> Path:
-        """The file."""
+        """Path of the file."""
 
 def pose_from_colmap(
     qvec: npt.ArrayLike,
     tvec: npt.ArrayLike,
     vehicle_from_world: npt.ArrayLike | None = None,
 ) -> npt.NDArray[np.float64]:
-    """vehicle_from_camera (4x4) of COLMAP's world-to-camera quaternion (w, x, y, z) and translation.
+    """Returns vehicle_from_camera (4x4) for COLMAP's world-to-camera quaternion (w, x, y, z) and translation.
 
-    vehicle_from_world is the similarity (4x4) from the model's world to the vehicle's frame; without, they are one.
-    pycolmap keeps quaternions as (x, y, z, w).
+    vehicle_from_world is the similarity (4x4) from the model's world to the vehicle's frame; without it, the two
+    are the same. pycolmap stores quaternions as (x, y, z, w).
 
         >>> vehicle_from_camera = pose_from_colmap([1, 0, 0, 0], [0, 0, 5], vehicle_from_world)
     """
 def pose_from_opencv(
     rvec: npt.ArrayLike, tvec: npt.ArrayLike, vehicle_from_world: npt.ArrayLike | None = None
 ) -> npt.NDArray[np.float64]:
-    """vehicle_from_camera (4x4) of OpenCV's world-to-camera rotation vector and translation, as cv2.solvePnP returns them.
+    """Returns vehicle_from_camera (4x4) for OpenCV's world-to-camera rvec and tvec, as cv2.solvePnP returns them.
 
-    vehicle_from_world is the similarity (4x4) from that world to the vehicle's frame; without, they are one.
+    vehicle_from_world is the similarity (4x4) from that world to the vehicle's frame; without it, the two are the
+    same.
 
         >>> vehicle_from_camera = pose_from_opencv([0.0, 0.0, 1.5], [0.0, 0.5, 6.0])
     """
@@ -568,25 +572,26 @@ def pose_from_opengl(
     camera_to_world: npt.ArrayLike,
     vehicle_from_world: npt.ArrayLike | None = None,
 ) -> npt.NDArray[np.float64]:
-    """vehicle_from_camera (4x4) of a camera-to-world matrix with OpenGL's camera axes (x right, y up, z backward), as in
-    nerfstudio's transforms.json and in Blender.
+    """Returns vehicle_from_camera (4x4) for a camera-to-world matrix with OpenGL's camera axes (x right, y up, z
+    backward), as in nerfstudio's transforms.json and in Blender.
 
-    vehicle_from_world is the similarity (4x4) from that world to the vehicle's frame; without, they are one.
+    vehicle_from_world is the similarity (4x4) from that world to the vehicle's frame; without it, the two are the
+    same.
 
         >>> vehicle_from_camera = pose_from_opengl(frame["transform_matrix"])
     """
 
 def pose_from_box(ego_from_vehicle: npt.ArrayLike, ego_from_camera: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """vehicle_from_camera (4x4) of a vehicle that was tracked as a box: the poses (3x4 or 4x4, metres) of the box and of
-    the camera in one frame (ego, map, UTM) at the moment of the picture. The box's axes are x forward, y left, z up, and
-    its origin lies on the vehicle's plane of symmetry.
+    """Returns vehicle_from_camera (4x4) for a vehicle that was tracked as a box, from the poses (3x4 or 4x4, metres)
+    of the box and of the camera in a common frame (ego, map, UTM) at the time of the picture. The box's axes are x
+    forward, y left, z up, and its origin lies on the vehicle's plane of symmetry.
 
         >>> vehicle_from_camera = pose_from_box(ego_from_vehicle, ego_from_camera)
     """
 
 def similarity_from_points(source: npt.ArrayLike, target: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """The similarity (4x4) that best takes points onto points, both (n, 3) with n >= 3 (Umeyama 1991): for example
-    vehicle_from_world from camera centres that are known in both frames.
+    """Returns the similarity (4x4) that best maps source to target, both (n, 3) with n >= 3 (Umeyama 1991): for
+    example vehicle_from_world from camera centres that are known in both frames.
 
         >>> vehicle_from_world = similarity_from_points(centers_in_world, centers_in_vehicle)
     """
@@ -658,10 +663,10 @@ def segment(
     camera: Camera,
     threads: int = 0,
 ) -> npt.NDArray[np.bool_]:
-    """The mask of a photograph that has none, by a segmentation network: bool (height, width), True where the vehicle is
-    that stands at the origin of the camera's vehicle frame.
+    """Computes the mask of a photograph by a segmentation network: bool (height, width), True for the vehicle at the
+    origin of the camera's vehicle frame.
 
-    image: RGB, uint8 (height, width, 3); with a fourth channel, alpha is not looked at.
+    image: RGB, uint8 (height, width, 3); the alpha of a fourth channel is ignored.
     threads: worker threads; 0 means one per core.
 
         >>> mask = segment(Model("segmentation.onnx"), images[0], cameras[0])  # doctest: +SKIP

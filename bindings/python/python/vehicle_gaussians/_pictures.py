@@ -1,4 +1,4 @@
-"""Pictures of other ranges than 0 to 1."""
+"""Pictures with other ranges than 0 to 1."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from ._arguments import bad_value
 
 
 def in_range(picture: Any, data_range: float | None) -> Any:
-    """The picture divided by its range: what white is in it. Without, bytes are to 255 and floats to 1."""
+    """The picture divided by its range, the value of white. Without a range, white is 255 in bytes and 1 in floats."""
     if data_range is None:
         return picture
     if not 0 < data_range < float("inf"):
-        raise bad_value("data_range", data_range, "above 0: what white is in both pictures")
+        raise bad_value("data_range", data_range, "above 0: the value of white in both pictures")
     array: npt.NDArray[Any] = np.asarray(picture)
     if array.dtype.kind not in "buif":
-        # For the words that others have for it.
+        # The caller reports the error.
         return picture
     return (array / data_range).astype(np.float32)

@@ -1,4 +1,4 @@
-"""What a progress function is told, and what its answer means."""
+"""Progress functions: their arguments and the meaning of their return values."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 #: Called as ``progress(stage, fraction)``, or as ``progress(stage, fraction, overall)`` if it has three parameters
-#: that must be given.
+#: without a default.
 Progress: TypeAlias = Callable[[str, float], object] | Callable[[str, float, float], object]
 
 
-def teller(progress: Progress) -> Callable[[str, float, float], bool]:
-    """Tells a progress function the stage, the part of it that is done and the part of all; whether to go on.
+def wrapped(progress: Progress) -> Callable[[str, float, float], bool]:
+    """Wraps a progress function as a function of stage, fraction and overall fraction that returns whether to go on.
 
-    Only ``False`` itself stops: what bars and streams return of their own accord is None, a number, or True
-    (``tqdm.update``), and an object of NumPy is not meant for an answer.
+    Only ``False`` itself cancels: progress bars and streams return None, a number, or True (``tqdm.update``), and a
+    NumPy object is not meant as an answer.
     """
     function: Callable[..., object] = progress
     if not callable(progress):
@@ -26,11 +26,11 @@ def teller(progress: Progress) -> Callable[[str, float, float], bool]:
 
 
 def _has_three_parameters(function: Callable[..., object]) -> bool:
-    """Of those with a default value, the third is the caller's own."""
+    """Whether the function has three parameters without a default; others are the caller's own."""
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):
-        # Of a function that is not written in Python there may be none.
+        # Functions that are not written in Python may have no signature.
         return False
     positional = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
     return sum(p.kind in positional and p.default is inspect.Parameter.empty for p in parameters) == 3

@@ -1,4 +1,4 @@
-"""Photographs in memory to a vehicle."""
+"""Reconstruction from photographs in memory."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class Reconstruction:
     """A finished reconstruction."""
 
     gaussians: Gaussians
-    """The vehicle."""
+    """The model of the vehicle."""
     report: dict[str, Any]
-    """What was done, how long it took, what was left out and why."""
+    """The report: what was done, how long it took, what was left out and why."""
     points: Points | None
-    """The point cloud, if asked for."""
+    """The point cloud, if requested."""
 
 
 def reconstruct(
@@ -76,50 +76,50 @@ def reconstruct(
     names: Iterable[str] | None = None,
     progress: Progress | None = None,
 ) -> Reconstruction:
-    """Reconstructs the vehicle that the photographs show.
+    """Reconstructs the vehicle in the photographs.
 
-    images: RGB, uint8 (height, width, 3); with a fourth channel, alpha is the mask where none is given.
-    masks: (height, width), bool or uint8 where 128 and above is vehicle, or 1 of 0 and 1; None where there is none.
+    images: RGB, uint8 (height, width, 3); the alpha of a fourth channel is the mask where none is given.
+    masks: (height, width), bool or uint8 where 128 and above is vehicle, or 1 of 0 and 1; None for no mask.
     cameras: one per image, posed in the vehicle's frame (x forward, y left, z up, metres; y = 0 is the plane of
     symmetry).
-    depths: floats (height, width), metres along the optical axis, 0 for none.
-    prior: "given" takes the depths, "hull" the silhouettes, "shape" the silhouettes and what vehicles look like,
-    "onnx" the network prior_model; "auto" the depths if every used view has them, else "shape",
-    which bends to those that are there, with a warning.
-    prior_model, head_model: networks that tell depth, and that make Gaussians of pixels.
-    calibrate: correct cameras and the plane of symmetry where the silhouettes contradict them ("auto"), or take them
-    as they are ("off").
-    symmetry: mirror what no view observed ("auto"), all of the denser side ("always"), nothing ("never"), or the
+    depths: floats (height, width), metres along the optical axis, 0 for no measurement.
+    prior: source of depth. "given": the depths; "hull": the silhouettes; "shape": the silhouettes and a shape model of
+    vehicles; "onnx": the network prior_model; "auto": the depths if every used view has them, else "shape", fitted to
+    the depths that exist, with a warning.
+    prior_model, head_model: networks that estimate depth, and that make Gaussians from pixels.
+    calibrate: correct cameras and the plane of symmetry where the silhouettes contradict them ("auto"), or use them as
+    given ("off").
+    symmetry: mirror the unobserved parts ("auto"), all of the denser side ("always"), nothing ("never"), or the
     photographs instead of the model ("flip").
-    relight: show mirror images in the light of their own side ("auto"), or as they were seen ("never").
-    photo: whether prior "shape" moves its surface to where the photographs agree.
-    cloud: points measured on the vehicle, floats (n, 3), metres, vehicle frame, all finite; some may be wrong or show
-    something else. Priors "shape" and "hull" bend their surface to them.
-    vehicle_size: length, width, height in metres, to a few centimetres, where known; the silhouettes tell where a box of
-    this size stands, and no part of the vehicle is placed outside of it.
-    vehicle_place: x, y, z of that box's centre, metres, and its turn about z, radians, in the frame of the cameras, where
-    known to a few decimetres. Its middle plane, not y = 0, is then the plane of symmetry; the result stays in the frame of
-    the cameras.
+    relight: relight mirror images for their own side ("auto"), or leave their colours as observed ("never").
+    photo: whether prior "shape" corrects its surface by photo-consistency.
+    cloud: points measured on the vehicle, floats (n, 3), metres, vehicle frame, all finite; it may contain outliers.
+    Priors "shape" and "hull" fit their surface to them.
+    vehicle_size: length, width, height in metres, if known to a few centimetres; the silhouettes determine the pose of
+    a box of this size, and no part of the vehicle is placed outside it.
+    vehicle_place: x, y, z of that box's centre, metres, and its rotation about z, radians, in the frame of the cameras,
+    if known to a few decimetres. Its middle plane, not y = 0, is then the plane of symmetry; the result stays in the
+    frame of the cameras.
     sh_degree: highest degree of the colour, 0 to 3.
-    keep: what may not be left out as not needed: "duplicate-views", "overlap", "silhouette-edge", "floaters",
-    "sh-bands", or "all".
-    check: draw the model into its input views for the report.
-    points: return the point cloud as well.
-    budget: seconds the call may take, where that matters; what is left out is then chosen to fit.
-    resolution: the share of their width and height to which the views are resampled first, above 0, at most 1; a budget
-    may choose less.
-    max_views: use at most this many views, those that spread best around the vehicle; a budget may choose fewer.
-    max_gaussians: most Gaussians that the model may have by what the masks say of its size; where they allow for more,
-    the views are resampled to fewer pixels, and the report's left_out says so. None: any number.
-    refine_iterations, refine_seconds: optimise the model against the photographs, by so many steps, or by as many as fit
-    into about so many seconds; the report tells how many that were. Beside a budget, not within it.
-    refine_hold_out: one of three or more views takes no part in that and tells when to stop.
-    refine_backend: who draws and goes back in it; "auto" is what is known to pay, at present the processor.
-    threads: worker threads; 0 means one per core. The result is the same with any number.
-    names: of the views, for messages and the report.
+    keep: omissions that must not be made: "duplicate-views", "overlap", "silhouette-edge", "floaters", "sh-bands", or
+    "all".
+    check: render the model into its input views to report the error there.
+    points: also return the point cloud.
+    budget: time limit of the call in seconds, if any; omissions are then chosen to fit.
+    resolution: fraction of their width and height to which the views are resampled first, above 0 and at most 1; a
+    budget may choose less.
+    max_views: use at most this many views, chosen to spread best around the vehicle; a budget may choose fewer.
+    max_gaussians: largest number of Gaussians, estimated from the masks; where they would give more, the views are
+    resampled to fewer pixels, which the report's left_out lists. None: any number.
+    refine_iterations, refine_seconds: optimise the model against the photographs for a number of steps, or for about a
+    number of seconds, in addition to a budget; the report holds the number of steps.
+    refine_hold_out: hold one of three or more views out of the optimisation, to decide when to stop.
+    refine_backend: device for rendering and gradients in the optimisation; "auto" is at present the CPU.
+    threads: worker threads; 0 means one per core. The result is the same for any number.
+    names: names of the views for messages and the report.
     progress: called on this thread as progress(stage, fraction), or progress(stage, fraction, overall) if it has three
-    parameters without a default: the part of the whole call that is done, in expected time, which ends at 1. False
-    cancels, and False alone: a CancelledError. An exception passes through. Ctrl-C raises KeyboardInterrupt.
+    parameters without a default; overall is the fraction of the whole call, by expected time, and ends at 1. Only a
+    return value of False cancels, with a CancelledError. Exceptions are passed on. Ctrl-C raises KeyboardInterrupt.
 
     >>> scene = open_scene("my-car")
     >>> made = reconstruct(scene.images, scene.masks, scene.cameras, scene.depths, names=scene.names)
@@ -158,6 +158,6 @@ def reconstruct(
         names=None if names is None else listed(names, "names"),
         progress=progress,
     )
-    told = json.loads(report)
-    reconstructed(told)
-    return Reconstruction(gaussians, told, None if lifted is None else Points(*lifted))
+    document = json.loads(report)
+    reconstructed(document)
+    return Reconstruction(gaussians, document, None if lifted is None else Points(*lifted))

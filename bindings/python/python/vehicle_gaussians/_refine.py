@@ -1,4 +1,4 @@
-"""Gaussians that are there already, fitted to photographs."""
+"""Optimisation of existing Gaussians against photographs."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 @documented
 class Refined(NamedTuple):
-    """What a refinement comes back as."""
+    """Result of a refinement."""
 
     gaussians: Gaussians
-    """The best that was found."""
+    """The best state that was found."""
     report: dict[str, Any]
-    """How many steps were planned, made and kept, why it ended, and the PSNR before and after."""
+    """Numbers of steps planned, made and kept, the reason for stopping, and the PSNR before and after."""
 
 
 def refine(
@@ -38,19 +38,19 @@ def refine(
     threads: int = 0,
     progress: Progress | None = None,
 ) -> Refined:
-    """Moves the Gaussians of any model until their pictures are the photographs of a scene.
+    """Optimises the Gaussians of any model so that their pictures match the photographs of a scene.
 
-    Nothing is known of which mirrors which: each goes its own way. ``reconstruct`` with ``refine_iterations`` keeps
-    both sides mirror images.
+    Mirror images are not tied to their originals: all Gaussians move independently. ``reconstruct`` with
+    ``refine_iterations`` keeps both sides mirror images.
 
     gaussians: in the frame of the scene's cameras.
-    scene: of ``open_scene``, or ``Scene(images, masks, depths, cameras, names)``.
-    iterations, seconds: so many steps, or as many as fit into about so many seconds; 300 steps if neither is given.
-    hold_out: one of three or more views takes no part and tells when to stop.
-    densify: Gaussians divide and go on the way; else they keep their number and order.
-    backend: who draws and goes back; "auto" is what is known to pay, at present the processor.
-    threads: worker threads; 0 means one per core. The same steps give the same bytes with any number.
-    progress: as for ``reconstruct``, with the one stage "refine".
+    scene: from ``open_scene``, or ``Scene(images, masks, depths, cameras, names)``.
+    iterations, seconds: number of steps, or time in seconds for about as many as fit; 300 steps if neither is given.
+    hold_out: hold one of three or more views out, to decide when to stop.
+    densify: split, clone and prune Gaussians; without it, their number and order do not change.
+    backend: device for rendering and gradients; "auto" is at present the CPU.
+    threads: worker threads; 0 means one per core. Equal steps give equal bytes for any number.
+    progress: as for ``reconstruct``, with the single stage "refine".
 
     >>> better = refine(car, scene, iterations=5).gaussians
     """

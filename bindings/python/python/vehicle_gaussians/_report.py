@@ -1,6 +1,6 @@
 """The report of a reconstruction with names and types, and its JSON schema.
 
-``docs/report.schema.json`` is what ``schema()`` gives; a test holds real reports to it.
+``docs/report.schema.json`` contains the result of ``schema()``; a test validates real reports against it.
 """
 
 from __future__ import annotations
@@ -29,69 +29,69 @@ class Stage:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Something the scene did not need."""
+    """Work that was left out because the scene did not need it."""
 
     what: str
-    """What: views, calibration, pixels, SH bands, clones."""
+    """Kind of work: views, calibration, pixels, SH bands, clones."""
     why: str
-    """Why it is not needed."""
+    """Reason why it is not needed."""
     count: int
-    """How many."""
+    """Number of items."""
 
 
 @dataclass(frozen=True)
 class ViewCalibration:
-    """How a view's camera was moved about the vehicle's middle, beside the plane's motion, which all share."""
+    """Correction of a view's camera, relative to the vehicle's centre, in addition to the motion of the plane."""
 
     name: str
     """The view's name."""
     pixels: float
-    """How far the picture of the vehicle's middle moved, pixels of the undistorted view."""
+    """Motion of the image of the vehicle's centre, pixels of the undistorted view."""
     degrees: float
     """Rotation, degrees."""
     metres: float
-    """Translation of the vehicle's middle, metres."""
+    """Translation of the vehicle's centre, metres."""
     vehicle_from_camera: list[float]
     """The corrected camera in the caller's vehicle frame, 12 numbers, row-major [R | t]."""
     ignored: bool
-    """Whether its silhouette was left out of the estimate and carves nothing."""
+    """Whether its silhouette was left out of the estimate and of the hull."""
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What the calibration found; of a refused correction, what was refused."""
+    """Result of the calibration; for a refused correction, the refused values."""
 
     verdict: Literal["not-needed", "accepted", "refused"]
-    """What became of the correction."""
+    """Whether the correction was needed and accepted."""
     why: str
-    """Why, in words."""
+    """Reason of the verdict."""
     yaw_degrees: float
     """Rotation about z that brings the true plane of symmetry onto y = 0, degrees."""
     roll_degrees: float
-    """Rotation about x that does, degrees."""
+    """Rotation about x that brings the true plane of symmetry onto y = 0, degrees."""
     lateral_m: float
-    """Shift along y, at the vehicle's middle, that does, metres."""
+    """Shift along y, at the vehicle's centre, that brings the true plane of symmetry onto y = 0, metres."""
     corrected_from_vehicle: list[float]
-    """The plane's whole motion, 12 numbers, row-major [R | t]."""
+    """The whole motion of the plane, 12 numbers, row-major [R | t]."""
     views: list[ViewCalibration]
-    """How each used view's camera was moved."""
+    """Correction of each used view's camera."""
     coverage_before: float
-    """Part of the masks' pixels whose rays meet the hull of all other views and of all mirrored ones, before."""
+    """Fraction of the masks' pixels whose rays meet the hull of all other and all mirrored views, before."""
     coverage_after: float
-    """Part of the masks' pixels whose rays meet the hull of the others with the correction."""
+    """Fraction of the masks' pixels whose rays meet the hull of the others, with the correction."""
     edge_error_before_px: float
-    """Mean of what rays on the silhouettes' edges miss the hull by, before, pixels; each at most 20."""
+    """Mean distance of rays on the silhouettes' edges from the hull, before, pixels; each counts at most 20."""
     edge_error_after_px: float
-    """Mean of what rays on the silhouettes' edges miss the hull by with the correction, pixels."""
+    """Mean distance of rays on the silhouettes' edges from the hull, with the correction, pixels."""
     held_out_before_px: float | None
-    """Mean miss of those rays only that the correction was not fitted to, before; None where nothing was fitted."""
+    """Mean distance of the rays that the correction was not fitted to, before, pixels; None if nothing was fitted."""
     held_out_after_px: float | None
-    """Mean miss of those rays with the correction."""
+    """Mean distance of those rays with the correction, pixels."""
 
 
 @dataclass(frozen=True)
 class VehicleSize:
-    """How long, wide and high the vehicle is; outer mirrors are often missing from the width."""
+    """Size of the vehicle; outer mirrors are often missing from the width."""
 
     size_m: list[float]
     """Length, width, height, metres."""
@@ -101,24 +101,24 @@ class VehicleSize:
 
 @dataclass(frozen=True)
 class WorkingBox:
-    """The box the prior looked for the vehicle in, which is larger than the vehicle."""
+    """The prior's search box, which is larger than the vehicle."""
 
     source: Literal["given", "estimated"]
-    """Whether the caller's size bounds it, or the silhouettes alone."""
+    """Whether the caller's size bounds it, or only the silhouettes."""
     size_m: list[float]
     """Length, width, height, metres."""
     low_m: list[float]
     """Lowest corner, metres."""
     contradicted_m: float
-    """By how much the caller's size and the silhouettes contradict each other, metres; 0 where they agree."""
+    """Contradiction between the caller's size and the silhouettes, metres; 0 if they agree."""
 
 
 @dataclass(frozen=True)
 class PointFit:
-    """What became of the points measured on the vehicle."""
+    """Fit of the surface to points measured on the vehicle."""
 
     used: int
-    """Points the surface was moved to."""
+    """Points that the surface was fitted to."""
     outside: int
     """Points outside the silhouettes' hull, which the vehicle cannot reach."""
     before_m: float
@@ -129,60 +129,60 @@ class PointFit:
 
 @dataclass(frozen=True)
 class PhotoFit:
-    """What the photographs said of the prior's surface."""
+    """Correction of the prior's surface by photo-consistency."""
 
     patches: int
-    """Patches that were looked for in other views."""
+    """Patches that were searched in other views."""
     found: int
     """Patches that were found."""
     before_m: float
-    """Median distance of the found places to the surface before, metres."""
+    """Median distance of the found patches from the surface before, metres."""
     after_m: float
-    """Median distance of the found places to the surface after, metres."""
+    """Median distance of the found patches from the surface after, metres."""
 
 
 @dataclass(frozen=True)
 class Filled:
-    """How the prior closed what its surface left open of the masks: the largest share of a mask, 0 to 1."""
+    """Extension of the prior's surface to cover the masks: the largest uncovered fraction of a mask, 0 to 1."""
 
     uncovered_before: float
-    """Left open by the surface as it was."""
+    """Uncovered fraction before."""
     uncovered_after: float
-    """Left open after it was bent."""
+    """Uncovered fraction after."""
 
 
 @dataclass(frozen=True)
 class Network:
-    """What the network said whose depth was taken."""
+    """Report of the network that estimated the depth."""
 
     prior: str
-    """What the network calls itself."""
+    """Name of the network."""
     size: list[int]
-    """Width and height of the pictures it was shown."""
+    """Width and height of its input pictures."""
     ray_degrees: float | None
     """Median angle between its rays and those of the intrinsics, degrees."""
     scale: float
-    """Metres per unit of its depth, as it says itself; 1 where it says nothing."""
+    """Metres per unit of its depth, according to the network; 1 if it has no such output."""
     poses: dict[str, Any] | None
-    """Its cameras against the caller's; None if it gives none or no two cameras are apart."""
+    """Its cameras against the caller's; None if it has none or all cameras are at one point."""
     rescaled: bool
-    """Whether depth was multiplied by the scale of the poses as well."""
+    """Whether depth was also multiplied by the scale of the poses."""
     views: dict[str, Any] | None
-    """Its views against each other; None where no two see the same place."""
+    """Consistency of its views; None where no two views overlap."""
     without_depth: int
-    """Vehicle pixels without depth: cut off, or of which it was not sure."""
+    """Vehicle pixels without depth: cropped, or with low confidence."""
     warnings: list[str]
-    """What makes the result doubtful."""
+    """Reasons to doubt the result."""
 
 
 @dataclass(frozen=True)
 class Machine:
-    """How fast the machine was found to be, as multiples of the reference machine."""
+    """Measured speed of the machine, as multiples of the reference machine."""
 
     serial: float
-    """One thread."""
+    """Speed of one thread."""
     parallel: float
-    """All threads of the call together."""
+    """Speed of all threads of the call together."""
 
 
 @dataclass(frozen=True)
@@ -192,42 +192,42 @@ class Chosen:
     prior: Literal["auto", "given", "hull", "shape", "onnx"]
     """Depth source."""
     resolution: float
-    """Share of the views' width and height."""
+    """Fraction of the views' width and height."""
     max_views: int | None
-    """Most views."""
+    """Largest number of views."""
     calibrate: Literal["auto", "off"]
     """Correction of the cameras."""
     photo: bool
-    """Photo-consistency."""
+    """Correction of the surface by photo-consistency."""
     relight: Literal["auto", "never"]
-    """Light of the unseen side."""
+    """Relighting of the unseen side."""
     check: bool
-    """Error on the input views."""
+    """Check of the error in the input views."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """How the options were chosen where the caller gave a budget."""
+    """Choice of the options for the caller's budget."""
 
     budget_s: float
-    """The caller's, seconds."""
+    """The caller's budget, seconds."""
     predicted_s: float
-    """The time predicted for what was chosen, seconds."""
+    """The time predicted for the chosen options, seconds."""
     fits: bool
-    """Whether that leaves enough room in the budget; if not, the fastest settings were chosen."""
+    """Whether the predicted time fits the budget; if not, the fastest settings were chosen."""
     took_s: float
-    """What the call took, seconds, without an optimisation that was asked for in addition."""
+    """Time of the call, seconds, without an additional optimisation."""
     kept: bool
-    """Whether that is within the budget."""
+    """Whether the time of the call is within the budget."""
     machine: Machine
-    """How fast this machine was found to be."""
+    """Measured speed of this machine."""
     chosen: Chosen
-    """What was chosen."""
+    """The chosen options."""
 
 
 @dataclass(frozen=True)
 class Symmetry:
-    """How the unseen side was completed."""
+    """Completion of the unseen side."""
 
     mode: Literal["auto", "always", "never", "flip"]
     """The rule."""
@@ -236,9 +236,9 @@ class Symmetry:
     cloned: int
     """Gaussians added as mirror images."""
     replaced: int
-    """Observed Gaussians given up for mirror images."""
+    """Observed Gaussians that were replaced by mirror images."""
     not_needed: int
-    """Gaussians not cloned because their mirrored place was observed too."""
+    """Gaussians that were not cloned because their mirrored position was also observed."""
 
 
 @dataclass(frozen=True)
@@ -255,7 +255,7 @@ class Relighting:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """The view that took no part in a refinement."""
+    """The view that was held out of a refinement."""
 
     view: str
     """Its name."""
@@ -265,28 +265,28 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class Refinement:
-    """What an optimisation did."""
+    """Report of an optimisation."""
 
     iterations: int
     """Steps that were planned."""
     made: int
     """Steps that were made."""
     kept: int
-    """Steps that the result has seen; 0 if nothing was better than the beginning."""
+    """Steps of the returned state; 0 if no state was better than the first."""
     stop: Literal["done", "held_out", "diverged", "unseen"]
-    """Why it ended."""
+    """Reason for stopping."""
     loss: list[float]
     """Loss of the first step, and the mean of the last round over the views."""
     psnr_db: list[float]
-    """Mean PSNR of the views that took part before and after, dB."""
+    """Mean PSNR of the optimised views before and after, dB."""
     held_out: HeldOut | None
-    """The view that took no part, where one was held out."""
+    """The held-out view, if any."""
     exposures: list[list[float]]
     """Factors of the views' exposures, RGB, in the order of the views."""
     densified: dict[str, Any] | None
-    """What density control did, where it was wanted."""
+    """Report of the density control, if requested."""
     drawn_by: str
-    """Who drew, and why."""
+    """The renderer that was chosen, and why."""
 
 
 @dataclass(frozen=True)
@@ -296,9 +296,9 @@ class InputError:
     psnr_db: float
     """Mean over the used views, full frame, dB."""
     silhouette_iou: float
-    """Mean over the used views: alpha of half and more against the mask."""
+    """Mean over the used views: pixels with alpha of at least half against the mask."""
     mask_covered: float
-    """The least over the used views: the part of the mask that is drawn with alpha of half and more, 0 to 1."""
+    """Smallest over the used views: fraction of the mask that is drawn with alpha of at least half, 0 to 1."""
 
 
 @dataclass(frozen=True)
@@ -308,38 +308,38 @@ class InputView:
     name: str
     """The view's name."""
     psnr_db: float
-    """Full frame, dB, drawn by the camera that was used: the calibration's, where it moved the camera."""
+    """Full frame, dB, rendered from the camera that was used: the corrected one, if the calibration moved it."""
     silhouette_iou: float
-    """Alpha of half and more against the mask."""
+    """Pixels with alpha of at least half against the mask."""
     mask_covered: float
-    """The part of the mask that is drawn with alpha of half and more, 0 to 1."""
+    """Fraction of the mask that is drawn with alpha of at least half, 0 to 1."""
     by_given_camera: InputError
-    """The same drawn by the caller's own camera."""
+    """Errors when rendered from the caller's own camera."""
 
 
 @dataclass(frozen=True)
 class Reason:
-    """Why the verdict is not good."""
+    """A reason why the verdict is not good."""
 
     code: str
-    """What it is about."""
+    """Identifier of the reason."""
     severity: Literal["doubtful", "bad"]
-    """How much it weighs."""
+    """Severity of the reason."""
     view: str | None
-    """The view's name, where one is concerned."""
+    """Name of the view, if it concerns one."""
     found: str
-    """What was found."""
+    """The value that was found."""
     expected: str
-    """What is expected."""
+    """The expected value."""
     cause: str
-    """The likely cause."""
+    """Likely cause."""
     remedy: str
-    """The way out."""
+    """Suggested remedy."""
 
 
 @dataclass(frozen=True)
 class Report:
-    """What a reconstruction did, how long it took, what was left out and why.
+    """Report of a reconstruction: what was done, how long it took, what was left out and why.
 
     >>> report = Report.of(made.report)
     >>> report.input_error.psnr_db > 20
@@ -351,13 +351,13 @@ class Report:
     prior: str
     """Depth source that was used; none for a baseline."""
     head: str
-    """Gaussian head that was used; of a baseline its name."""
+    """Gaussian head that was used; for a baseline, its name."""
     stages: list[Stage]
     """Wall time of each stage, in order."""
     total_ms: float
     """Wall time of the whole call, milliseconds."""
     peak_rss_bytes: int | None
-    """Highest resident memory of the process so far, bytes; None where the system does not tell."""
+    """Peak resident memory of the process so far, bytes; None where the system does not report it."""
     threads: int
     """Worker threads."""
     gaussians: int
@@ -369,49 +369,49 @@ class Report:
     views_used: list[str]
     """Names of the views that were used."""
     calibration: Calibration | None
-    """How the cameras were corrected; None if that was switched off or these views cannot be calibrated."""
+    """Correction of the cameras; None if it was switched off or these views cannot be calibrated."""
     vehicle: VehicleSize | None
-    """How long, wide and high the vehicle is; None for a baseline."""
+    """Size of the vehicle; None for a baseline."""
     working_box: WorkingBox | None
-    """The box the prior looked for the vehicle in, in the corrected frame."""
+    """The prior's search box, in the corrected frame."""
     cloud: PointFit | None
-    """What the prior made of points measured on the vehicle."""
+    """Fit of the prior's surface to points measured on the vehicle."""
     photo: PhotoFit | None
-    """What the photographs said of the prior's surface, where they were asked."""
+    """Correction of the prior's surface by photo-consistency, if any."""
     masks: Filled | None
-    """How the prior closed what its surface left open of the masks."""
+    """Extension of the prior's surface to cover the masks."""
     network: Network | None
-    """What the network said whose depth was taken."""
+    """Report of the network that estimated the depth."""
     plan: Plan | None
-    """How the options were chosen, where the caller gave a budget."""
+    """Choice of the options, if the caller gave a budget."""
     left_out: list[LeftOut]
-    """Work this scene did not need."""
+    """Work that this scene did not need."""
     warnings: list[str]
-    """What is legal but looks like a mistake, or did not turn out as it was asked for."""
+    """Warnings about legal input that looks like a mistake, or a request that could not be met."""
     symmetry: Symmetry
-    """How the unseen side was completed."""
+    """Completion of the unseen side."""
     relight: Relighting | None
-    """The light of the unseen side, where it was estimated."""
+    """The light of the unseen side, if it was estimated."""
     refinement: Refinement | None
-    """What the optimisation did, where it was asked for."""
+    """Report of the optimisation, if requested."""
     input_error: InputError | None
-    """Error on the input views as drawn by the cameras that were used, unless the check was switched off."""
+    """Error in the input views, rendered from the cameras that were used; None if the check was switched off."""
     input_error_by_given_cameras: InputError | None
-    """The same as drawn by the caller's own cameras."""
+    """Error in the input views, rendered from the caller's own cameras."""
     input_views: list[InputView]
-    """The errors in each view; empty if the check was switched off."""
+    """Errors in each view; empty if the check was switched off."""
     verdict: Literal["good", "unchecked", "doubtful", "bad"]
-    """Whether the result is to be believed."""
+    """Whether the result is reliable."""
     verdict_reasons: list[Reason]
-    """Why it is not good."""
+    """Reasons why the verdict is not good."""
     evidence: dict[str, Any]
-    """The numbers that the verdict goes by."""
+    """Numbers on which the verdict is based."""
     settings: dict[str, Any]
-    """The options of the call; where it had a budget, those that were chosen."""
+    """Options of the call; with a budget, the options that were chosen."""
 
     @classmethod
     def of(cls, report: Mapping[str, Any]) -> Report:
-        """The report that ``reconstruct`` returns or the program writes, without what only a newer library says."""
+        """Parses a report of ``reconstruct`` or of the program; fields of newer versions are ignored."""
         return _made(cls, report)
 
 

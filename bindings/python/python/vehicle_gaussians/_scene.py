@@ -19,18 +19,18 @@ from ._progress import Progress
 @equal_by_value
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Views of one vehicle, a list entry each, as ``reconstruct`` takes them."""
+    """Views of one vehicle, one list entry each, as the arguments of ``reconstruct``."""
 
     images: list[npt.NDArray[np.uint8]]
     """RGB, uint8 (height, width, 3)."""
     masks: list[npt.NDArray[np.bool_] | None]
     """True is vehicle, (height, width); None where there is no mask."""
     depths: list[npt.NDArray[np.float32] | None]
-    """Metres along the optical axis, 0 for none, float32 (height, width); None where there is no depth map."""
+    """Metres along the optical axis, 0 for no measurement, float32 (height, width); None for no depth map."""
     cameras: list[Camera]
-    """Posed in the vehicle's frame."""
+    """Cameras, posed in the vehicle's frame."""
     names: list[str]
-    """The pictures' paths below their images folder."""
+    """Paths of the pictures below their images folder."""
 
 
 def open_scene(
@@ -42,15 +42,15 @@ def open_scene(
     load_depth: bool = True,
     progress: Progress | None = None,
 ) -> Scene:
-    """Opens a scene: a ``transforms.json`` in nerfstudio's format, a folder with one, or a COLMAP folder.
+    """Opens a scene: a ``transforms.json`` in nerfstudio's format, a folder that holds one, or a COLMAP folder.
 
-    views: the views wanted, in this order, by path, file name, or file name without extension; all if not given.
+    views: views to read, in this order, by path, file name, or file name without extension; all if not given.
     vehicle_from_world: the similarity from the scene's world to the vehicle's frame, as a 4x4 matrix or the JSON file
-    that holds one. A COLMAP model needs it; a transforms.json is taken to be in the vehicle's frame without.
-    depth_scale: metres per number in the depth files, instead of what the scene says.
-    progress: as for ``reconstruct``, with the one stage "read".
+    that holds one. A COLMAP model needs it; without it, a transforms.json is taken to be in the vehicle's frame.
+    depth_scale: metres per unit of the depth files; overrides the scene's value.
+    progress: as for ``reconstruct``, with the single stage "read".
 
-    What is legal but looks like a mistake is a warning.
+    Legal input that looks like a mistake is reported as a warning.
 
     >>> scene = open_scene("my-car", ["000", "002"])
     >>> scene.names

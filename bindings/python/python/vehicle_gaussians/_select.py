@@ -1,4 +1,4 @@
-"""Indices of NumPy's to whole numbers."""
+"""Conversion of NumPy's indices to whole numbers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ._arguments import bad_type, bad_value
 
 
 def indices(index: Any, n: int) -> npt.NDArray[np.int64]:
-    """Which of n an index selects: a slice, an array of n bools, or of whole numbers, negative ones from the end."""
+    """Items of n that an index selects: a slice, or an array of n bools or of whole numbers, negative from the end."""
     allowed = f"a slice, {n} bools, or whole numbers"
     if isinstance(index, slice):
         return np.arange(n, dtype=np.int64)[index]

@@ -1,4 +1,4 @@
-"""What is legal but looks like a mistake: warnings, and lines for the logger ``vehicle_gaussians``."""
+"""Warnings about legal input that looks like a mistake, and the logger ``vehicle_gaussians``."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-#: What the library has to say beside its results. Without a handler of the host's it says nothing: warnings are there
-#: already.
+#: Logger of the library. Without a handler of the host program it prints nothing, because warnings are issued anyway.
 LOGGER = logging.getLogger("vehicle_gaussians")
 LOGGER.addHandler(logging.NullHandler())
 
@@ -18,11 +17,11 @@ _PACKAGE = str(Path(__file__).parent)
 
 
 class VgWarning(UserWarning):
-    """Something that is legal but looks like a mistake, or that did not turn out as it was asked for."""
+    """A warning about legal input that looks like a mistake, or about a request that could not be met."""
 
 
 def warn(text: str) -> None:
-    """Warns of the line that called the package, and logs the same."""
+    """Issues a warning at the line that called the package, and logs it."""
     LOGGER.warning("%s", text)
     frame, level = sys._getframe(), 1
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
@@ -31,7 +30,7 @@ def warn(text: str) -> None:
 
 
 def reconstructed(report: Mapping[str, Any]) -> None:
-    """Logs what a reconstruction left out and how long it took, and warns of what looks like a mistake."""
+    """Logs a reconstruction's omissions and times, and issues its warnings."""
     for left in report["left_out"]:
         LOGGER.info("left out %d %s: %s", left["count"], left["what"], left["why"])
     for stage in report["stages"]:

@@ -1,4 +1,4 @@
-"""The package where the extension module cannot be had: ``capi`` works, and what needs the module says so when used."""
+"""Support for the package without its extension module: ``capi`` works, and functions that need the module raise."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _NAME = __package__ + "._native"
 
 
 def complete() -> None:
-    """Puts a module in the place of ``_native``, if it cannot be imported, whose contents raise ``ImportError``."""
+    """Replaces ``_native``, if it cannot be imported, by a module whose contents raise ``ImportError``."""
     try:
         import_module(_NAME)
     except ImportError as why:
@@ -30,24 +30,24 @@ class _Native(ModuleType):
             return capi.version()
         if name.startswith("__"):
             raise AttributeError(name)
-        return _Absent(name, (), {"__module__": __package__, "_why": self._why, "__doc__": _said(name, self._why)})
+        return _Absent(name, (), {"__module__": __package__, "_why": self._why, "__doc__": _message(name, self._why)})
 
 
 class _Absent(type):
-    """The class of what is not there: a class, so that annotations and ``isinstance`` may name it."""
+    """A missing member of the module: a class, so that annotations and ``isinstance`` can name it."""
 
     _why: ImportError
 
     def __call__(cls, *arguments: object, **named: object) -> Any:
-        raise ImportError(_said(cls.__name__, cls._why)) from cls._why
+        raise ImportError(_message(cls.__name__, cls._why)) from cls._why
 
     def __getattr__(cls, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
-        raise ImportError(_said(f"{cls.__name__}.{name}", cls._why)) from cls._why
+        raise ImportError(_message(f"{cls.__name__}.{name}", cls._why)) from cls._why
 
 
-def _said(name: str, why: ImportError) -> str:
+def _message(name: str, why: ImportError) -> str:
     return (
         f"{__package__}.{name} needs the extension module {_NAME}, which cannot be imported ({why}); "
         f"{__package__}.capi does the same through ctypes, and an install from a checkout of the repository brings it: "

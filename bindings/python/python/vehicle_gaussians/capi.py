@@ -1,7 +1,7 @@
-"""The library through ctypes alone: the C interface of ``include/vg.h``, and thin functions over it.
+"""The library through ctypes: the C interface of ``include/vg.h``, and thin functions over it.
 
 For environments that load shared libraries but no extension modules, for other versions of the library, and as the
-model of a binding in any language. It gives the same bytes as the package itself.
+model of a binding in any language. Results are equal to those of the package, byte for byte.
 
 >>> from vehicle_gaussians import capi
 >>> scene = capi.open_scene("my-car")
@@ -44,7 +44,7 @@ from ._frozen import FrozenArray
 from ._gradients import Gradients, Planes
 from ._measures import PictureErrors, SurfaceErrors, ViewErrors
 from ._pictures import in_range
-from ._progress import Progress, teller
+from ._progress import Progress, wrapped
 from ._select import indices
 from ._warn import reconstructed, warn
 
@@ -702,21 +702,21 @@ def _load(path: Path) -> ct.CDLL:
         "Hints: install the package from a checkout of the repository (`pip install ./bindings/python`), which builds "
         "the library and puts it there; or let the environment variable VG_LIBRARY name a libvg"
     )
-    said = "VG_LIBRARY names it. " if os.environ.get("VG_LIBRARY") else ""
+    source = "It is set by VG_LIBRARY. " if os.environ.get("VG_LIBRARY") else ""
     if not path.is_file():
-        raise ImportError(f"{path}: there is no such library. {said}{hints}")
+        raise ImportError(f"{path}: no such file. {source}{hints}")
     try:
         loaded = ct.CDLL(str(path))
     except OSError as error:
-        raise ImportError(f"{path}: cannot be loaded: {error}. {said}{hints}") from error
+        raise ImportError(f"{path}: cannot be loaded: {error}. {source}{hints}") from error
     missing = [name for name in PROTOTYPES if not hasattr(loaded, name)]
     if "vg_abi_version" in missing:
-        raise ImportError(f"{path}: not a libvg: it has no vg_abi_version. {said}{hints}")
+        raise ImportError(f"{path}: not a libvg: it has no vg_abi_version. {source}{hints}")
     found = loaded.vg_abi_version()
     if found != ABI_VERSION:
-        raise ImportError(f"{path}: has binary interface {found}; this module needs {ABI_VERSION}. {said}{hints}")
+        raise ImportError(f"{path}: has binary interface {found}; this module needs {ABI_VERSION}. {source}{hints}")
     if missing:
-        raise ImportError(f"{path}: older than this module: it has no {', '.join(missing)}. {said}{hints}")
+        raise ImportError(f"{path}: older than this module: it has no {', '.join(missing)}. {source}{hints}")
     for name, (result, arguments) in PROTOTYPES.items():
         function = getattr(loaded, name)
         function.restype, function.argtypes = result, arguments
@@ -737,7 +737,7 @@ def _utf8(text: bytes | None) -> str:
 
 
 def _call(name: str, *arguments: Any) -> None:
-    """Calls a function whose last argument is out_error; a failure is a VgError."""
+    """Calls a function whose last argument is out_error; raises a failure as a VgError."""
     error = ct.c_void_p()
     status = getattr(library, name)(*arguments, ct.byref(error))
     if status != Status.OK:
@@ -746,7 +746,7 @@ def _call(name: str, *arguments: Any) -> None:
         raise VgError(status, _in_python(message) if status in (Status.ARGUMENT, Status.NOT_BUILT) else message)
 
 
-#: What the header calls arguments, and what this module does.
+#: Names of arguments in the header and in this module.
 _NAMES = (
     (r"^(options|arrays|gradient|view)\.", ""),
     (r"^views(\[\d+\])(?: \(.*?\))?\.(camera|image|mask|depth|name)\b", r"\2s\1"),
@@ -777,10 +777,10 @@ def _initial(structure: type[ct.Structure]) -> Any:
 
 
 class _Handle:
-    """An object of the library, freed when nobody refers to it any more."""
+    """An object of the library, freed with the last reference to it."""
 
-    #: What it holds, and what to do where it is needed elsewhere.
-    _holds, _way_out = "memory of this process", "elsewhere a new one is made"
+    #: Contents of the object, and the alternative to pickling it.
+    _holds, _way_out = "memory of this process", "another process must make a new one"
 
     def __reduce_ex__(self, protocol: object) -> NoReturn:
         raise TypeError(
@@ -791,7 +791,7 @@ class _Handle:
     def __init__(self, name: str, pointer: ct.c_void_p) -> None:
         self._as_parameter_ = pointer.value
         free = getattr(library, f"vg_{name}_free")
-        # At the end of the process the system takes the memory; arrays may still look at it.
+        # At the end of the process the system frees the memory, which arrays may still use.
         weakref.finalize(self, free, pointer.value).atexit = False
 
     def array(self, address: int | None, shape: tuple[int, ...], dtype: npt.DTypeLike) -> npt.NDArray[Any]:
@@ -804,7 +804,7 @@ class _Handle:
 
 
 class Context(_Handle):
-    """Worker threads and memory for calls that follow each other; 0 threads means one per core."""
+    """Worker threads and memory that several calls share; 0 threads means one per core."""
 
     _holds, _way_out = "threads of this process", "another process makes its own: Context(threads)"
 
@@ -824,7 +824,7 @@ class Model(_Handle):
     """A network in an ONNX file, for prior_model and head_model of reconstruct; the arguments are those of
     vehicle_gaussians.Model. Any number of threads may use one at a time."""
 
-    _holds, _way_out = "a network that is open in this process", "another process opens its file again: Model(path)"
+    _holds, _way_out = "a network that is open in this process", "another process must open the file again: Model(path)"
 
     def __init__(
         self,
@@ -852,7 +852,7 @@ class Model(_Handle):
 
 
 def _threads(number: int) -> int:
-    # The library knows the highest.
+    # The library checks the upper limit.
     return whole(number, "threads", 0, _U32, "0 (all cores) to 1024")
 
 
@@ -861,7 +861,7 @@ _U32 = (1 << 32) - 1
 
 
 class AnyCamera(Protocol):
-    """What vehicle_gaussians.Camera offers."""
+    """Interface of vehicle_gaussians.Camera that is used here."""
 
     @property
     def model(self) -> str: ...
@@ -881,7 +881,7 @@ Camera: TypeAlias = vg_camera | AnyCamera
 def camera_from_colmap(
     model: str | int, width: int, height: int, params: npt.ArrayLike, vehicle_from_camera: npt.ArrayLike
 ) -> vg_camera:
-    """A camera of one of COLMAP's models; the pose is 3x4 or 4x4."""
+    """Makes a camera of one of COLMAP's models; the pose is 3x4 or 4x4."""
     if not isinstance(model, (str, int)):
         raise bad_type("model", model, "COLMAP's name or number")
     number = CameraModel.__members__.get(model) if isinstance(model, str) else model
@@ -908,8 +908,8 @@ def camera_from_opencv(
     tvec: npt.ArrayLike | None = None,
     vehicle_from_world: npt.ArrayLike | None = None,
 ) -> vg_camera:
-    """A camera of OpenCV's calibration, which puts the centre of the top-left pixel at (0, 0); the arguments are those
-    of vehicle_gaussians.Camera.from_opencv."""
+    """Makes a camera from OpenCV's calibration, with the centre of the top-left pixel at (0, 0); the arguments are
+    those of vehicle_gaussians.Camera.from_opencv."""
     k, bent = doubles(K, "K", (3, 3)), doubles(distortion, "distortion")
     if vehicle_from_camera is None and rvec is not None and tvec is not None:
         vehicle_from_camera = pose_from_opencv(rvec, tvec, vehicle_from_world)
@@ -934,7 +934,7 @@ def camera_look_at(
     fov_y_degrees: float = 35.0,
     up: npt.ArrayLike = (0.0, 0.0, 1.0),
 ) -> vg_camera:
-    """A pinhole camera placed by hand; the arguments are those of vehicle_gaussians.Camera.look_at."""
+    """Makes a pinhole camera; the arguments are those of vehicle_gaussians.Camera.look_at."""
     points = [doubles(point, name, (3,)) for point, name in ((eye, "eye"), (target, "target"), (up, "up"))]
     size, made = (_side(width, "width"), _side(height, "height")), vg_camera()
     addresses = [point.ctypes.data for point in points]
@@ -949,7 +949,7 @@ def project(
     camera: Camera, points: npt.ArrayLike, depth: Literal[True]
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]: ...
 def project(camera: Camera, points: npt.ArrayLike, depth: bool = False) -> Any:
-    """Pixels of points, and their depths; the arguments are those of vehicle_gaussians.Camera.project."""
+    """Projects points to pixels and depths; the arguments are those of vehicle_gaussians.Camera.project."""
     posed, places = _camera(camera), _rows(points, "points", 3)
     pixels, depths = np.empty((len(places), 2)), np.empty(len(places))
     numbers = (places.ctypes.data, len(places), pixels.ctypes.data, depths.ctypes.data)
@@ -958,7 +958,7 @@ def project(camera: Camera, points: npt.ArrayLike, depth: bool = False) -> Any:
 
 
 def unproject(camera: Camera, pixels: npt.ArrayLike, depths: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Points behind pixels; the arguments are those of vehicle_gaussians.Camera.unproject."""
+    """Returns the points behind pixels; the arguments are those of vehicle_gaussians.Camera.unproject."""
     posed, places, along = _camera(camera), _rows(pixels, "pixels", 2), doubles(depths, "depths")
     if along.shape != (len(places),):
         raise bad_value("depths", f"shape {along.shape}", f"({len(places)},), one for each pixel")
@@ -976,14 +976,14 @@ def _rows(numbers: npt.ArrayLike, argument: str, columns: int) -> npt.NDArray[np
 
 
 def _side(number: int, argument: str) -> int:
-    # The library knows the highest.
+    # The library checks the upper limit.
     return whole(number, argument, 1, _U32, "1 to 8192")
 
 
 def pose_from_colmap(
     qvec: npt.ArrayLike, tvec: npt.ArrayLike, vehicle_from_world: npt.ArrayLike | None = None
 ) -> npt.NDArray[np.float64]:
-    """vehicle_from_camera (4x4) of COLMAP's world-to-camera quaternion (w, x, y, z) and translation."""
+    """Returns vehicle_from_camera (4x4) for COLMAP's world-to-camera quaternion (w, x, y, z) and translation."""
     q, t, world = doubles(qvec, "qvec", (4,)), doubles(tvec, "tvec", (3,)), _similarity(vehicle_from_world)
     made = np.eye(4)
     _call("vg_pose_from_colmap", q.ctypes.data, t.ctypes.data, _address(world), made.ctypes.data)
@@ -993,11 +993,11 @@ def pose_from_colmap(
 def pose_from_opencv(
     rvec: npt.ArrayLike, tvec: npt.ArrayLike, vehicle_from_world: npt.ArrayLike | None = None
 ) -> npt.NDArray[np.float64]:
-    """vehicle_from_camera (4x4) of OpenCV's world-to-camera rotation vector and translation."""
+    """Returns vehicle_from_camera (4x4) for OpenCV's world-to-camera rotation vector and translation."""
     vectors = []
     for vector, name in ((rvec, "rvec"), (tvec, "tvec")):
         array = doubles(vector, name)
-        # OpenCV hands out (3, 1).
+        # OpenCV returns (3, 1).
         if array.size != 3:
             raise bad_value(name, f"shape {array.shape}", "3 numbers")
         vectors.append(array)
@@ -1009,7 +1009,7 @@ def pose_from_opencv(
 def pose_from_opengl(
     camera_to_world: npt.ArrayLike, vehicle_from_world: npt.ArrayLike | None = None
 ) -> npt.NDArray[np.float64]:
-    """vehicle_from_camera (4x4) of a camera-to-world matrix with OpenGL's camera axes, as nerfstudio writes it."""
+    """Returns vehicle_from_camera (4x4) for a camera-to-world matrix with OpenGL's camera axes, as in nerfstudio."""
     matrix, world = pose(camera_to_world, "camera_to_world"), _similarity(vehicle_from_world)
     made = np.eye(4)
     _call("vg_pose_from_opengl", matrix.ctypes.data, _address(world), made.ctypes.data)
@@ -1017,7 +1017,7 @@ def pose_from_opengl(
 
 
 def pose_from_box(ego_from_vehicle: npt.ArrayLike, ego_from_camera: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """vehicle_from_camera (4x4) of a tracked box and the camera in one frame."""
+    """Returns vehicle_from_camera (4x4) from the poses of a tracked box and of the camera in a common frame."""
     vehicle, camera = pose(ego_from_vehicle, "ego_from_vehicle"), pose(ego_from_camera, "ego_from_camera")
     made = np.eye(4)
     _call("vg_pose_from_box", vehicle.ctypes.data, camera.ctypes.data, made.ctypes.data)
@@ -1056,7 +1056,7 @@ def _lent_gaussians(gaussians: Gaussians, argument: str = "gaussians") -> _Handl
 
 
 class Gaussians:
-    """The Gaussians of a vehicle. They do not change; arrays are read-only views that keep them alive."""
+    """The Gaussians of a vehicle. They are immutable; arrays are read-only views that keep them alive."""
 
     def __init__(self, handle: _Handle) -> None:
         self._handle = handle
@@ -1105,7 +1105,7 @@ class Gaussians:
 
     @classmethod
     def from_ply_bytes(cls, data: bytes | bytearray | memoryview) -> Gaussians:
-        """From the bytes of a PLY file in the layout of 3D Gaussian Splatting."""
+        """Reads the bytes of a PLY file in the layout of 3D Gaussian Splatting."""
         try:
             held = np.frombuffer(data, np.uint8)
         except (TypeError, ValueError):
@@ -1113,7 +1113,7 @@ class Gaussians:
         return cls._made_by("vg_gaussians_load_ply_memory", held.ctypes.data, held.size)
 
     def to_ply_bytes(self) -> bytes:
-        """What save_ply writes, as bytes."""
+        """Returns the bytes that save_ply writes."""
         data = np.empty(library.vg_gaussians_ply_size(self._handle), np.uint8)
         _call("vg_gaussians_save_ply_memory", self._handle, data.ctypes.data, data.size)
         return data.tobytes()
@@ -1121,15 +1121,15 @@ class Gaussians:
     def __getitem__(
         self, index: slice | Sequence[int] | Sequence[bool] | npt.NDArray[np.integer[Any] | np.bool_]
     ) -> Gaussians:
-        """Those that an index of NumPy's selects: a slice, bools, or whole numbers."""
+        """The Gaussians that a NumPy index selects: a slice, bools, or whole numbers."""
         chosen = indices(index, len(self)).astype(np.uintp)
         return self._made_by("vg_gaussians_select", self._handle, chosen.ctypes.data, len(chosen))
 
-    #: No sequence: each of them is Gaussians again.
+    #: Not iterable: indexing returns Gaussians again.
     __iter__ = None
 
     def cropped(self, low: npt.ArrayLike, high: npt.ArrayLike) -> Gaussians:
-        """Those whose centre lies in the box from low to high, metres, its faces included."""
+        """The Gaussians whose centre lies in the box from low to high, metres, including its faces."""
         corners = doubles(low, "low", (3,)), doubles(high, "high", (3,))
         return self._made_by("vg_gaussians_crop", self._handle, *(corner.ctypes.data for corner in corners))
 
@@ -1160,12 +1160,12 @@ class Gaussians:
         return self._made_by("vg_gaussians_mirror", self._handle)
 
     def transformed(self, to_from_vehicle: npt.ArrayLike) -> Gaussians:
-        """These in another frame, moved by a 4x4 similarity."""
+        """The Gaussians in another frame, transformed by a 4x4 similarity."""
         matrix = doubles(to_from_vehicle, "to_from_vehicle", (4, 4))
         return self._made_by("vg_gaussians_transform", self._handle, matrix.ctypes.data)
 
     def merged(self, other: Gaussians) -> Gaussians:
-        """These, then those of other."""
+        """These Gaussians followed by those of other."""
         return self._made_by("vg_gaussians_merge", self._handle, _lent_gaussians(other, "other"))
 
     def render(
@@ -1177,7 +1177,7 @@ class Gaussians:
         antialiased: bool = False,
         context: Context | None = None,
     ) -> npt.NDArray[Any]:
-        """The picture a camera takes, RGB, or RGBA with straight alpha on a "transparent" background."""
+        """Renders a camera's picture, RGB, or RGBA with straight alpha on a "transparent" background."""
         return self._draw(camera, background, np.dtype(dtype), antialiased, context, with_depth=False)[0]
 
     def render_with_depth(
@@ -1189,7 +1189,7 @@ class Gaussians:
         antialiased: bool = False,
         context: Context | None = None,
     ) -> tuple[npt.NDArray[Any], npt.NDArray[np.float32]]:
-        """The picture, and its depth in metres, 0 where there is nothing."""
+        """Renders the picture and its depth in metres, 0 where there is no Gaussian."""
         picture, depth = self._draw(camera, background, np.dtype(dtype), antialiased, context, with_depth=True)
         assert depth is not None
         return picture, depth
@@ -1217,7 +1217,7 @@ class Gaussians:
         depth = np.empty(size, np.float32) if with_depth else None
         target.width, target.height = posed.width, posed.height
         target.color, target.depth = picture.ctypes.data, _address(depth)
-        with _told(options, None):
+        with _reporting(options, None):
             _call("vg_render", self._handle, ct.byref(posed), ct.byref(options), ct.byref(target))
         return (picture[..., :3] if opaque else picture), depth
 
@@ -1231,7 +1231,7 @@ class Gaussians:
         backend: _types.Backend = "auto",
         context: Context | None = None,
     ) -> Planes:
-        """The picture as losses look at it: colour over the background or premultiplied, alpha, and depth."""
+        """Renders a picture for use in a loss: colour over the background or premultiplied, alpha, and depth."""
         posed, target = _camera(camera), _initial(vg_image_target)
         options = _render_options(background, antialiased, context)
         options.alpha, options.depth_mode = Alpha.PREMULTIPLIED, _choice(DepthMode, "depth_mode", depth_mode)
@@ -1240,7 +1240,7 @@ class Gaussians:
         picture, alpha, depth = np.empty((*size, 4), np.float32), np.empty(size, np.float32), np.empty(size, np.float32)
         target.width, target.height, target.color_format = posed.width, posed.height, Format.RGBA32F
         target.color, target.alpha, target.depth = picture.ctypes.data, alpha.ctypes.data, depth.ctypes.data
-        with _told(options, None):
+        with _reporting(options, None):
             _call("vg_render", self._handle, ct.byref(posed), ct.byref(options), ct.byref(target))
         return Planes(np.ascontiguousarray(picture[..., :3]), alpha, depth)
 
@@ -1257,8 +1257,8 @@ class Gaussians:
         backend: _types.Backend = "auto",
         context: Context | None = None,
     ) -> Gradients:
-        """Gradients of everything a picture is made of, from those of a loss with respect to its planes; the arguments
-        are those of vehicle_gaussians.Gaussians.render_backward. Planes are read where they are."""
+        """Gradients of all inputs of a picture, from those of a loss with respect to its planes; the arguments
+        are those of vehicle_gaussians.Gaussians.render_backward. Planes are read in place."""
         posed, gradient, out = _camera(camera), _initial(vg_image_gradient), _initial(vg_gradients)
         options = _render_options(background, antialiased, context)
         options.alpha, options.depth_mode = Alpha.PREMULTIPLIED, _choice(DepthMode, "depth_mode", depth_mode)
@@ -1291,7 +1291,7 @@ class Gaussians:
             setattr(out, field, values.ctypes.data)
         out.count, out.sh_degree = n, self.sh_degree
         arguments = (ct.byref(posed), ct.byref(options), None, ct.byref(gradient), ct.byref(out))
-        with _told(options, None):
+        with _reporting(options, None):
             _call("vg_render_backward", self._handle, *arguments)
         return made
 
@@ -1333,7 +1333,7 @@ class Gaussians:
         return int(library.vg_gaussians_count(self._handle))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Arrays for pickle, which come back to the last bit."""
+        """Arrays for pickle, which restores them bit for bit."""
         return Gaussians.from_arrays, (self.means, self.scales, self.quats, self.opacities, self.sh)
 
     def __copy__(self) -> Gaussians:
@@ -1356,11 +1356,11 @@ class Gaussians:
 
 
 class Renderer(_Handle):
-    """Gaussians made ready to be drawn many times: backend is "auto", "cpu" or "gpu". Any number of threads may use one
+    """Gaussians prepared for rendering many times: backend is "auto", "cpu" or "gpu". Any number of threads may use one
     at a time."""
 
     _holds = "working memory of this process"
-    _way_out = "elsewhere a new one is made of its Gaussians: Renderer(gaussians, backend)"
+    _way_out = "another process must make a new one from the Gaussians: Renderer(gaussians, backend)"
 
     def __init__(
         self,
@@ -1377,12 +1377,12 @@ class Renderer(_Handle):
 
     @property
     def backend(self) -> str:
-        """Who draws: "cpu" or "gpu"."""
+        """The renderer that was chosen: "cpu" or "gpu"."""
         return Backend(library.vg_renderer_backend(self)).name.lower()
 
     @property
     def choice(self) -> str:
-        """Who draws, and why."""
+        """The renderer that was chosen, and why."""
         return _utf8(library.vg_renderer_choice(self))
 
     def render(
@@ -1408,7 +1408,7 @@ class Renderer(_Handle):
             target.width, target.height = camera.width, camera.height
             target.color, target.color_format = picture.ctypes.data, format
         array = (vg_camera * len(posed))(*posed)
-        with _told(options, progress):
+        with _reporting(options, progress):
             _call("vg_renderer_render", self, array, len(posed), ct.byref(options), targets)
         return pictures
 
@@ -1443,7 +1443,7 @@ class Points(NamedTuple):
 
 @documented
 class Refined(NamedTuple):
-    """What a refinement comes back as."""
+    """Result of a refinement."""
 
     gaussians: Gaussians
     """The best that was found."""
@@ -1458,7 +1458,7 @@ class Reconstruction(NamedTuple):
     gaussians: Gaussians
     """The vehicle."""
     report: dict[str, Any]
-    """What was done, how long it took, what was left out and why."""
+    """The report: what was done, how long it took, what was left out and why."""
     points: Points | None
     """The point cloud, if asked for."""
 
@@ -1496,35 +1496,35 @@ def reconstruct(
     log: Callable[[LogLevel, str], object] | None = None,
     context: Context | None = None,
 ) -> Reconstruction:
-    """Reconstructs the vehicle that the photographs show; the arguments are those of vehicle_gaussians.reconstruct.
+    """Reconstructs the vehicle in the photographs; the arguments are those of vehicle_gaussians.reconstruct.
 
-    Pictures whose pixels lie together are read where they are, whatever lies between their rows.
+    Pictures are read in place if the pixels of each row are contiguous.
     """
     alive: list[Any] = []
     views = _views(images, masks, cameras, depths, names, alive)
     options = _initial(vg_options)
     options.context = _lent_context(context)
     options.prior, options.symmetry = _choice(Prior, "prior", prior), _choice(Symmetry, "symmetry", symmetry)
-    # Referred to by this call's arguments until it returns.
+    # Keeps what the arguments point to alive until the call returns.
     options.prior_model = _lent_model(prior_model, "prior_model")
     options.head_model = _lent_model(head_model, "head_model")
     options.calibrate = _choice(Calibrate, "calibrate", calibrate)
     options.relight, options.photo = _choice(Relight, "relight", relight), photo
     if budget is not None:
-        # Of C, 0 is none.
+        # In C, 0 means none.
         if budget == 0:
             raise bad_value("budget", budget, "seconds above 0")
         options.budget_s = real(budget, "budget")
     options.resolution = real(resolution, "resolution")
     if max_views is not None:
-        # Of C, 0 is all.
+        # In C, 0 means all.
         options.max_views = whole(max_views, "max_views", 1, sys.maxsize, "at least 1")
-    # Of C, 0 is any number.
+    # In C, 0 means any number.
     options.max_gaussians = (
         0 if max_gaussians is None else whole(max_gaussians, "max_gaussians", 1, sys.maxsize, "at least 1")
     )
     if refine_iterations is not None:
-        # Of C, 0 is none.
+        # In C, 0 means none.
         options.refine_iterations = whole(refine_iterations, "refine_iterations", 1, _U32, "1 to 1000000")
     if refine_seconds is not None:
         if refine_seconds == 0:
@@ -1543,7 +1543,7 @@ def reconstruct(
         *center, options.vehicle_yaw = doubles(vehicle_place, "vehicle_place", (4,)).tolist()
         options.vehicle_center[:], options.has_vehicle_place = center, 1
     car, report = ct.c_void_p(), ct.c_void_p()
-    with _told(options, progress) as raised:
+    with _reporting(options, progress) as raised:
         options.log = LogFn(_logger(log, raised)) if log is not None else LogFn()
         _call("vg_reconstruct", views, len(views), ct.byref(options), ct.byref(car), ct.byref(report))
         gaussians, made = Gaussians(_Handle("gaussians", car)), _Handle("report", report)
@@ -1554,9 +1554,9 @@ def reconstruct(
             made.array(library.vg_report_point_positions(made), (count, 3), np.float32),
             made.array(library.vg_report_point_colors(made), (count, 3), np.uint8),
         )
-    told = json.loads(library.vg_report_json(made))
-    reconstructed(told)
-    return Reconstruction(gaussians, told, lifted)
+    document = json.loads(library.vg_report_json(made))
+    reconstructed(document)
+    return Reconstruction(gaussians, document, lifted)
 
 
 def _views(
@@ -1567,7 +1567,7 @@ def _views(
     names: Iterable[str] | None,
     alive: list[Any],
 ) -> ct.Array[vg_view]:
-    """Views that look at the arrays in ``alive``."""
+    """Views that point to the arrays in ``alive``."""
     pictures = listed(images, "images", 3)
     n = len(pictures)
     if n == 0:
@@ -1606,7 +1606,7 @@ def refine(
     progress: Progress | None = None,
     context: Context | None = None,
 ) -> Refined:
-    """Moves the Gaussians of any model until their pictures are the photographs of a scene; the arguments are those of
+    """Optimises the Gaussians of any model against the photographs of a scene; the arguments are those of
     vehicle_gaussians.refine."""
     alive: list[Any] = []
     views = _views(scene.images, scene.masks, scene.cameras, scene.depths, scene.names, alive)
@@ -1616,15 +1616,15 @@ def refine(
         options.iterations = whole(iterations, "iterations", 1, _U32, "1 to 1000000")
     if seconds is not None:
         if iterations is not None:
-            raise bad_value("seconds", f"{seconds:g}, with iterations {iterations}", "one of both")
-        # Of C, 0 is none.
+            raise bad_value("seconds", f"{seconds:g}, with iterations {iterations}", "only one of the two")
+        # In C, 0 means none.
         if seconds == 0:
             raise bad_value("seconds", seconds, "above 0, at most 86400")
         options.seconds = real(seconds, "seconds")
     options.hold_out, options.densify = hold_out, densify
     options.backend = _choice(Backend, "backend", backend)
     handle = _lent_gaussians(gaussians)
-    with _told(options, progress):
+    with _reporting(options, progress):
         _call("vg_refine", handle, views, len(views), ct.byref(options), ct.byref(made), ct.byref(done))
         refined = Gaussians(_Handle("gaussians", made))
     held_out = [done.held_out_before_db, done.held_out_after_db]
@@ -1638,16 +1638,16 @@ def refine(
 
 
 @contextlib.contextmanager
-def _told(options: Any, progress: Progress | None) -> Iterator[list[BaseException]]:
-    """Has a call with these options tell ``progress`` how far it is, and end at Ctrl-C. Hands out the list of what was
+def _reporting(options: Any, progress: Progress | None) -> Iterator[list[BaseException]]:
+    """Makes a call with these options report to ``progress`` and end at Ctrl-C. Yields the list of exceptions that were
     raised in callbacks, of which the first is raised at the end."""
     raised: list[BaseException] = []
-    tell, overall = None if progress is None else teller(progress), ct.c_double()
+    report, overall = None if progress is None else wrapped(progress), ct.c_double()
 
     def on_progress(stage: bytes, fraction: float, _: object) -> int:
         try:
-            told = overall.value if has_stages else fraction
-            return int(bool(raised) or not (tell is None or tell(stage.decode(), fraction, told)))
+            part = overall.value if has_stages else fraction
+            return int(bool(raised) or not (report is None or report(stage.decode(), fraction, part)))
         except BaseException as error:
             raised.append(error)
             return 1
@@ -1655,7 +1655,7 @@ def _told(options: Any, progress: Progress | None) -> Iterator[list[BaseExceptio
     has_stages = isinstance(options, vg_options)
     if has_stages:
         options.progress_overall = ct.pointer(overall)
-    # Always there: between two calls of it Python cannot see Ctrl-C.
+    # Always set: Python can handle Ctrl-C only when it is called.
     options.progress = ProgressFn(on_progress)
     try:
         with _signals_kept(raised):
@@ -1669,7 +1669,7 @@ def _told(options: Any, progress: Progress | None) -> Iterator[list[BaseExceptio
 
 @contextlib.contextmanager
 def _signals_kept(raised: list[BaseException]) -> Iterator[None]:
-    """Keeps what the handler of Ctrl-C raises: in a callback, ctypes would print it and forget it."""
+    """Keeps exceptions of the handler of Ctrl-C, which ctypes would print and drop in a callback."""
     usual = signal.getsignal(signal.SIGINT)
     if not callable(usual) or threading.current_thread() is not threading.main_thread():
         yield
@@ -1711,7 +1711,7 @@ def _choice(choices: type[enum.IntEnum], argument: str, name: str) -> int:
 
 
 def _kept(keep: Keep | int | _types.Keep | Iterable[_types.Keep]) -> int:
-    """Bits of Keep; also by the words of vehicle_gaussians.reconstruct."""
+    """Bits of Keep, also from the words of vehicle_gaussians.reconstruct."""
     if isinstance(keep, int):
         return whole(keep, "keep", 0, int(~Keep(0)), "bits of Keep, 0 to 31")
     words = {member.lower().replace("_", "-"): bit for member, bit in Keep.__members__.items()}
@@ -1776,7 +1776,7 @@ def _measured(points: npt.ArrayLike, argument: str) -> npt.NDArray[np.float32]:
 
 
 def _lent(array: npt.NDArray[Any], format: Format, alive: list[Any]) -> vg_image:
-    """The pixels where they are, if they lie together and rows follow each other downwards; else a copy."""
+    """The pixels in place if each row is contiguous and rows run downwards; else a copy."""
     height, width = array.shape[:2]
     pixel = array.itemsize * (array.shape[2] if array.ndim == 3 else 1)
     together = array.strides[1:] == ((pixel, array.itemsize) if array.ndim == 3 else (pixel,))
@@ -1789,9 +1789,9 @@ def _lent(array: npt.NDArray[Any], format: Format, alive: list[Any]) -> vg_image
 def segment(
     model: Model, image: npt.NDArray[np.uint8], camera: Camera, *, context: Context | None = None
 ) -> npt.NDArray[np.uint8]:
-    """The mask of a photograph that has none, by a segmentation network: uint8 (height, width), 255 is the vehicle.
+    """Computes the mask of a photograph by a segmentation network: uint8 (height, width), 255 is the vehicle.
 
-    The image is RGB or RGBA and read where it is; alpha is not looked at.
+    The image is RGB or RGBA and read in place; alpha is ignored.
     """
     _lent_model(model, "model")
     alive: list[Any] = []
@@ -1810,7 +1810,7 @@ def _metrics_options(lpips: Model | None, f_score: float, context: Context | Non
 
 
 def _measures(errors: ct.Structure) -> list[float | None]:
-    """All fields but the size; NAN is None."""
+    """All fields except the size; NAN becomes None."""
     values = (getattr(errors, field[0]) for field in errors._fields_[1:])
     return [None if value != value else value for value in values]
 
@@ -1834,8 +1834,8 @@ def picture_errors(
     lpips: Model | None = None,
     context: Context | None = None,
 ) -> PictureErrors:
-    """The difference of two pictures of one size, uint8 or floats in [0, 1], (height, width, 3 or 4); the arguments are
-    those of vehicle_gaussians.picture_errors.
+    """Measures the difference of two pictures of one size, uint8 or floats in [0, 1], (height, width, 3 or 4); the
+    arguments are those of vehicle_gaussians.picture_errors.
     """
     alive: list[Any] = []
     a, b = in_range(a, data_range), in_range(b, data_range)
@@ -1855,7 +1855,7 @@ def view_errors(
     lpips: Model | None = None,
     context: Context | None = None,
 ) -> ViewErrors:
-    """The error of a model, drawn on white, in one photograph, which its mask puts on white."""
+    """Measures the error of a model, drawn on white, against one photograph, which its mask composites on white."""
     alive: list[Any] = []
     view = _initial(vg_view)
     view.camera, view.image = _camera(camera), _photograph(image, "image", alive)
@@ -1864,7 +1864,7 @@ def view_errors(
     if depth is not None:
         view.depth = _depth(depth, "depth", alive)
     options, errors = _metrics_options(lpips, 0.05, context), _initial(vg_view_errors)
-    with _told(options, None):
+    with _reporting(options, None):
         _call("vg_metrics_view", _lent_gaussians(gaussians), ct.byref(view), ct.byref(options), ct.byref(errors))
     return ViewErrors(*_measures(errors))  # type: ignore[arg-type]
 
@@ -1872,14 +1872,14 @@ def view_errors(
 def surface_errors(
     gaussians: Gaussians, points: _types.Floats, *, f_score: float = 0.05, context: Context | None = None
 ) -> SurfaceErrors:
-    """The error of a model's surface against points measured on the vehicle: float32 (n, 3), metres, its frame.
+    """Measures the error of a model's surface against points on the vehicle: float32 (n, 3), metres, its frame.
 
-    f_score: the distance below which a point counts as met, metres.
+    f_score: the distance below which a point counts as correct, metres.
     """
     scan = _measured(points, "points")
     options, errors = _metrics_options(None, f_score, context), _initial(vg_surface_errors)
     lists = (_lent_gaussians(gaussians), scan.ctypes.data, len(scan))
-    with _told(options, None):
+    with _reporting(options, None):
         _call("vg_metrics_surface", *lists, ct.byref(options), ct.byref(errors))
     return SurfaceErrors(*_measures(errors))  # type: ignore[arg-type]
 
@@ -1916,7 +1916,7 @@ def _masked_views(
 
 
 def _points(points: npt.ArrayLike | None, argument: str) -> npt.NDArray[np.float64]:
-    """Points of any unit, (n, 3), in row order; none for None."""
+    """Points of any unit, (n, 3), in row order; empty for None."""
     array = np.zeros((0, 3)) if points is None else doubles(points, argument)
     if array.ndim != 2 or array.shape[1] != 3:
         raise bad_value(argument, f"shape {array.shape}", "(n, 3)")
@@ -1934,13 +1934,13 @@ def align_scan(
     progress: Progress | None = None,
     context: Context | None = None,
 ) -> Alignment:
-    """The vehicle's frame by points scanned on the vehicle; the arguments are those of vehicle_gaussians.align_scan."""
+    """Finds the vehicle's frame from points scanned on it; the arguments are those of vehicle_gaussians.align_scan."""
     alive: list[Any] = []
     views, found = _masked_views(masks, cameras, names, alive), _initial(vg_alignment)
     world, scanned = _points(sparse, "sparse"), _measured(scan, "scan")
     lists = (views, len(views), world.ctypes.data, len(world), scanned.ctypes.data, len(scanned))
     options = _align_options(heading, context)
-    with _told(options, progress):
+    with _reporting(options, progress):
         _call("vg_align_scan", *lists, ct.byref(options), ct.byref(found))
     return _alignment(found)
 
@@ -1956,19 +1956,19 @@ def align_box(
     progress: Progress | None = None,
     context: Context | None = None,
 ) -> Alignment:
-    """The vehicle's frame by its size and the ground; the arguments are those of vehicle_gaussians.align_box."""
+    """Finds the vehicle's frame from its size and the ground; arguments are those of vehicle_gaussians.align_box."""
     alive: list[Any] = []
     views, found = _masked_views(masks, cameras, names, alive), _initial(vg_alignment)
     world, sides = _points(sparse, "sparse"), doubles(size, "size", (3,))
     lists = (views, len(views), world.ctypes.data, len(world), sides.ctypes.data)
     options = _align_options(heading, context)
-    with _told(options, progress):
+    with _reporting(options, progress):
         _call("vg_align_box", *lists, ct.byref(options), ct.byref(found))
     return _alignment(found)
 
 
 def align_points(world: npt.ArrayLike, vehicle: npt.ArrayLike) -> Alignment:
-    """The similarity between points known in both frames; the arguments are those of vehicle_gaussians.align_points."""
+    """Finds the similarity from points known in both frames, as vehicle_gaussians.align_points."""
     source, target = _points(world, "world"), _points(vehicle, "vehicle")
     if len(source) != len(target):
         raise bad_value("vehicle", len(target), f"as many as world, {len(source)}")
@@ -1987,17 +1987,17 @@ def align_folder(
     progress: Progress | None = None,
     context: Context | None = None,
 ) -> Alignment:
-    """align_scan with the files of a scene; the arguments are those of vehicle_gaussians.align_folder."""
+    """Runs align_scan on the files of a scene; the arguments are those of vehicle_gaussians.align_folder."""
     found, file = _initial(vg_alignment), None if scan is None else os.fsencode(scan)
     options = _align_options(heading, context)
-    with _told(options, progress):
+    with _reporting(options, progress):
         _call("vg_align_folder", os.fsencode(path), file, ct.byref(options), ct.byref(found))
     return _alignment(found)
 
 
 @equal_by_value
 class Scene(NamedTuple):
-    """Views of one vehicle, a list entry each; the arrays are read-only views of the library's memory."""
+    """Views of one vehicle, one list entry each; the arrays are read-only views of the library's memory."""
 
     images: list[npt.NDArray[np.uint8]]
     """RGB, uint8 (height, width, 3)."""
@@ -2021,8 +2021,8 @@ def open_scene(
     progress: Progress | None = None,
     context: Context | None = None,
 ) -> Scene:
-    """Opens a transforms.json, a folder with one, or a COLMAP folder; the arguments are those of
-    vehicle_gaussians.open_scene. What is legal but looks like a mistake is a warning."""
+    """Opens a transforms.json, a folder that holds one, or a COLMAP folder; the arguments are those of
+    vehicle_gaussians.open_scene. Legal input that looks like a mistake is reported as a warning."""
     options = _initial(vg_scene_options)
     options.context = _lent_context(context)
     world = _similarity(vehicle_from_world)
@@ -2038,7 +2038,7 @@ def open_scene(
     has_transforms = path.is_file() or (path / "transforms.json").is_file()
     made = ct.c_void_p()
     name = "vg_transforms_open" if has_transforms else "vg_colmap_open"
-    with _told(options, progress) as raised:
+    with _reporting(options, progress) as raised:
         options.log = LogFn(_logger(lambda _, note: notes.append(note), raised))
         _call(name, os.fsencode(path), ct.byref(options), ct.byref(made))
         handle = _Handle("scene", made)
@@ -2068,7 +2068,7 @@ def evaluate(
     progress: Progress | None = None,
     context: Context | None = None,
 ) -> list[ViewScore]:
-    """The errors of a model in every view of a scene, one row a view; the arguments are those of
+    """Measures the errors of a model in every view of a scene, one row for each; the arguments are those of
     vehicle_gaussians.evaluate."""
     if not isinstance(scene, Scene):
         scene = open_scene(scene, views, vehicle_from_world, context=context)

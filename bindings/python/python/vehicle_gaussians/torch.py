@@ -1,13 +1,12 @@
-"""Pictures that PyTorch can differentiate.
+"""Differentiable rendering for PyTorch.
 
 >>> from vehicle_gaussians.torch import render
 >>> picture = render(means, quats, scales, opacities, sh, camera)
 >>> (picture.color - photograph).square().mean().backward()
 
-Drawing is done by the library, on the processor, and so is the way back; PyTorch is needed by this module alone:
-``pip install torch``. Tensors are float32 on the CPU; others are refused and not moved, because a copy to and from a
-device in every step is better seen where it is made. Activations (exp for scales, sigmoid for opacities) are the
-caller's, in PyTorch.
+The library renders and computes the gradients on the CPU; only this module needs PyTorch: ``pip install torch``.
+Tensors are float32 on the CPU; others are an error and are not moved, because copies to and from a device in every step
+should be visible in the caller's code. Activations (exp for scales, sigmoid for opacities) are left to the caller.
 """
 
 from __future__ import annotations
@@ -35,14 +34,14 @@ __all__ = ["Picture", "render"]
 
 
 class Picture(NamedTuple):
-    """What was drawn, as float32 tensors that can be differentiated."""
+    """A rendered picture as differentiable float32 tensors."""
 
     color: torch.Tensor
     """sRGB-encoded, over the background; premultiplied by alpha where that is transparent. (height, width, 3)"""
     alpha: torch.Tensor
-    """How much of the pixel the vehicle covers, 0 to 1, whatever the background. (height, width)"""
+    """Coverage of the pixel by the vehicle, 0 to 1, for any background. (height, width)"""
     depth: torch.Tensor
-    """Metres along the optical axis, 0 where there is nothing. (height, width)"""
+    """Metres along the optical axis, 0 where there is no Gaussian. (height, width)"""
 
 
 def render(
@@ -63,18 +62,18 @@ def render(
     backend: Backend = "auto",
     threads: int = 0,
 ) -> Picture:
-    """Draws Gaussians as a camera sees them; gradients go to every tensor that requires them.
+    """Renders Gaussians from a camera; gradients are computed for every tensor that requires them.
 
-    Of n Gaussians: means (n, 3) and scales (n, 3), standard deviations, in metres; quats (n, 4), quaternions
-    (w, x, y, z) of any norm but zero, which are normalised on the way and the gradient with them; opacities (n,) from
+    The tensors of n Gaussians are means (n, 3) and scales (n, 3), standard deviations, in metres; quats (n, 4),
+    quaternions (w, x, y, z) of any norm except zero, whose normalisation is part of the gradient; opacities (n,) from
     0 to 1; sh (n, (degree + 1)^2, 3).
 
     background is "white", "black", "transparent" or a tensor (3,) of numbers from 0 to 1. pose is a tensor (6,): the
-    camera is turned about its own axes by the rotation vector pose[:3], radians, and moved by pose[3:] along the axes
-    it had, metres; zeros leave it where it is. The other arguments are those of Gaussians.render_planes.
+    camera is rotated about its own axes by the rotation vector pose[:3], radians, and translated by pose[3:] along its
+    original axes, metres; zeros do not move it. The other arguments are those of Gaussians.render_planes.
 
-    Constants are the order of depth, the pixels a Gaussian reaches, what is too faint to be drawn, near and far.
-    There are no second derivatives.
+    Treated as constant are the depth order, the pixels that a Gaussian reaches, the cut of faint Gaussians, near and
+    far. There are no second derivatives.
     """
     count = means.shape[0] if isinstance(means, torch.Tensor) and means.ndim > 0 else -1
     bands = sh.shape[1] if isinstance(sh, torch.Tensor) and sh.ndim == 3 else 16
@@ -124,7 +123,7 @@ class _Render(torch.autograd.Function):
         camera: Camera,
         settings: dict[str, Any],
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        # Saved by PyTorch, so that it notices what is changed in place, and frees them after the way back.
+        # Saved by PyTorch, which then detects changes in place and frees them after the backward pass.
         ctx.save_for_backward(
             *(means, quats, scales, opacities, sh),
             background if isinstance(background, torch.Tensor) else None,
@@ -159,7 +158,7 @@ class _Render(torch.autograd.Function):
             made.opacities,
             made.sh,
             made.background,
-            None if pose is None else _of_pose(_numpy(pose), made.pose),
+            None if pose is None else _pose_gradient(_numpy(pose), made.pose),
         )
         gradients = [
             torch.from_numpy(np.ascontiguousarray(value, np.float32)) if needed and value is not None else None
@@ -186,7 +185,7 @@ def _numpy(tensor: torch.Tensor) -> npt.NDArray[np.float32]:
 
 
 def _moved(vehicle_from_camera: npt.NDArray[np.float64], pose: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
-    """The camera turned and moved along its own axes: R exp([w]), t + R v."""
+    """The camera rotated and translated along its own axes: R exp([w]), t + R v."""
     moved = vehicle_from_camera.copy()
     rotation = vehicle_from_camera[:3, :3]
     w, v = pose[:3].astype(np.float64), pose[3:].astype(np.float64)
@@ -195,10 +194,10 @@ def _moved(vehicle_from_camera: npt.NDArray[np.float64], pose: npt.NDArray[np.fl
     return moved
 
 
-def _of_pose(pose: npt.NDArray[np.float32], at_camera: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """From the gradient of small motions of the camera where it was drawn to that of the motion that brought it there.
+def _pose_gradient(pose: npt.NDArray[np.float32], at_camera: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Converts the gradient of small motions at the rendered pose to the gradient of the pose argument.
 
-    exp(w + dw) = exp(w) exp(J dw), J the right Jacobian; and dv is along the axes from before the turn.
+    exp(w + dw) = exp(w) exp(J dw), J the right Jacobian; dv is along the axes before the rotation.
     """
     w = pose[:3].astype(np.float64)
     return np.concatenate([_right_jacobian(w).T @ at_camera[:3], _exp(w) @ at_camera[3:]])

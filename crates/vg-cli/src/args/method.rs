@@ -1,4 +1,4 @@
-//! How a reconstruction is made, as options of the command line.
+//! Command-line options of a reconstruction.
 
 use super::values::{KnownBox, at_least_one, backend, known_box, positive, refinement, share};
 use crate::job::{self, Failure, USAGE};
@@ -12,85 +12,85 @@ use vg::relight::Relight;
 use vg::render::Backend;
 use vg::symmetry::SymmetryMode;
 
-/// How a reconstruction is made; shared by `reconstruct` and `eval`.
+/// Options of a reconstruction, shared by `reconstruct`, `eval` and `report`.
 #[derive(Args)]
 pub(crate) struct MethodArgs {
-    /// Depth source: the scene's own depth; the visual hull; the hull corrected by what vehicles look like (shape);
-    /// the network of --prior-model (onnx); or (auto) the first if every used view has depth, else shape, which bends to
-    /// the depth of the views that have it
+    /// Depth source: the scene's own depth (given); the visual hull (hull); the hull corrected by a shape model of
+    /// vehicles (shape); the network of --prior-model (onnx); or (auto) given if every used view has depth, else shape,
+    /// fitted to the depth of the views that have it
     #[arg(long, value_enum, default_value_t = Prior::Auto)]
     prior: Prior,
-    /// The geometry network of --prior onnx: an ONNX file in the contract of docs/ONNX.md
+    /// Geometry network for --prior onnx: an ONNX file that meets the contract of docs/ONNX.md
     #[arg(long, value_name = "M.onnx")]
     pub(crate) prior_model: Option<PathBuf>,
-    /// A Gaussian head, an ONNX file in the contract of docs/ONNX.md, instead of the built-in one
+    /// Gaussian head to use instead of the built-in one: an ONNX file that meets the contract of docs/ONNX.md
     #[arg(long, value_name = "M.onnx")]
     pub(crate) head_model: Option<PathBuf>,
-    /// Leave out what the head's network says of where a pixel's Gaussian is beside the depth (the paper's ablation)
+    /// Ignore the position offsets that the head's network predicts (the paper's ablation)
     #[arg(long, requires = "head_model")]
     no_offset: bool,
-    /// ONNX Runtime's library or its folder; else VG_ONNXRUNTIME, else that of an installed Python package
+    /// ONNX Runtime's library or its folder [default: VG_ONNXRUNTIME, else an installed Python package's]
     #[arg(long, value_name = "PATH")]
     onnxruntime: Option<PathBuf>,
-    /// Where networks run: the processor, CUDA, or CUDA where it can be had
+    /// Device for networks: the CPU, CUDA, or CUDA where available (auto)
     #[arg(long, value_enum, default_value_t = RunsOn::Cpu)]
     provider: RunsOn,
-    /// Mirror what was not observed (auto), all of the denser side (always), nothing (never), or the photographs
-    /// instead of the model (flip)
+    /// Mirror the unobserved parts (auto), all of the denser side (always), nothing (never), or the photographs instead
+    /// of the model (flip)
     #[arg(long, value_enum, default_value_t = Symmetry::Auto)]
     symmetry: Symmetry,
-    /// Show mirror images in the light of their own side, as far as it can be told from what was seen (auto), or as
-    /// they were seen (never)
+    /// Relight mirror images for their own side, as far as the observed light allows (auto), or leave their colours as
+    /// observed (never)
     #[arg(long, value_enum, default_value_t = Relit::Auto)]
     relight: Relit,
-    /// Correct the plane of symmetry and the cameras where the silhouettes contradict them (auto), or take them as
-    /// they are (off)
+    /// Correct the plane of symmetry and the cameras where the silhouettes contradict them (auto), or use them as given
+    /// (off)
     #[arg(long, value_enum, default_value_t = Calibration::Auto)]
     calibrate: Calibration,
-    /// Length, width and height of the vehicle in metres, where known, to a few centimetres; with X,Y,Z,YAW also where its
-    /// box stands: the centre in metres and the turn about z in radians, in the frame of the cameras
+    /// Length, width and height of the vehicle in metres, if known to a few centimetres; X,Y,Z,YAW add the pose of its
+    /// box: the centre in metres and the rotation about z in radians, in the frame of the cameras
     #[arg(long = "box", value_name = "L,W,H[,X,Y,Z,YAW]", value_parser = known_box, allow_hyphen_values = true)]
     vehicle_box: Option<KnownBox>,
-    /// Highest degree of the spherical harmonics that hold the colour [default: 2; of a baseline 3]
+    /// Highest degree of the spherical harmonics that hold the colour [default: 2; with --baseline 3]
     #[arg(long, value_name = "0..3", value_parser = clap::value_parser!(u8).range(0..=3))]
     sh_degree: Option<u8>,
-    /// Points measured on the vehicle, PLY in its frame, metres: a surface that is estimated is moved to them
+    /// Points measured on the vehicle, PLY in its frame, metres; an estimated surface is fitted to them
     #[arg(long, value_name = "P.ply")]
     pub(crate) cloud: Option<PathBuf>,
-    /// What the plan may not leave out, separated by commas
+    /// Omissions that the plan must not make, separated by commas
     #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
     keep: Vec<KeepItem>,
-    /// Seconds the reconstruction may take: what does not fit is left out
+    /// Time limit of the reconstruction in seconds; steps that do not fit are left out
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     budget: Option<f64>,
-    /// Resample the views to this share of their width and height first
+    /// Resample the views first to this fraction of their width and height
     #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = share)]
     resolution: f64,
-    /// Use at most this many views, those that spread best around the vehicle
+    /// Use at most N views, chosen to spread best around the vehicle
     #[arg(long, value_name = "N", value_parser = at_least_one)]
     max_views: Option<usize>,
-    /// Most Gaussians that the model may have by what the masks say of its size; where they allow for more, the views are
-    /// resampled to fewer pixels
+    /// Largest number of Gaussians, estimated from the masks; where they would give more, the views are resampled to
+    /// fewer pixels
     #[arg(long, value_name = "N", default_value_t = DEFAULT_MAX_GAUSSIANS, value_parser = at_least_one)]
     max_gaussians: usize,
-    /// Optimise the model against the photographs: so many steps (300), or as many as fit into so many seconds (5s)
+    /// Optimise the model against the photographs for a number of steps (300) or of seconds (5s)
     #[arg(long, value_name = "N|SECONDSs", value_parser = refinement)]
     refine: Option<Amount>,
-    /// Keep one of three or more views out of the optimisation, to tell when to stop
+    /// Hold one of three or more views out of the optimisation, to decide when to stop
     #[arg(long, requires = "refine")]
     refine_hold_out: bool,
-    /// Let Gaussians divide and go in the optimisation, as 3D Gaussian splatting does
+    /// Split, clone and prune Gaussians in the optimisation, as 3D Gaussian splatting does
     #[arg(long, requires = "refine")]
     refine_densify: bool,
-    /// Who draws and goes back in the optimisation: the processor, a graphics processor in a build that has one, or what
-    /// is known to pay (auto: the processor)
+    /// Device for rendering and gradients in the optimisation: cpu, gpu (in a build with GPU support), or auto, at
+    /// present the CPU
     #[arg(long, requires = "refine", value_name = "auto|cpu|gpu", default_value = "auto", value_parser = backend)]
     refine_backend: Backend,
     /// Fit another method to the input views instead, for comparison: 3D Gaussian splatting from a random start or from
-    /// --cloud, without any prior; --refine tells how long (2000)
-    #[arg(long, value_enum, value_name = "METHOD", conflicts_with_all = NOT_OF_A_BASELINE)]
+    /// --cloud, without any prior; --refine sets the number of steps (2000) or seconds
+    #[arg(long, value_enum, value_name = "METHOD", conflicts_with_all = CONFLICTS_WITH_BASELINE)]
     baseline: Option<Baseline>,
-    /// Do not move the shape prior's surface to where the photographs agree
+    /// Do not correct the shape prior's surface by photo-consistency
     #[arg(long)]
     no_photo: bool,
     /// Worker threads; 0 means one per core
@@ -98,8 +98,8 @@ pub(crate) struct MethodArgs {
     pub(crate) threads: usize,
 }
 
-/// Arguments of what a baseline has not.
-const NOT_OF_A_BASELINE: [&str; 16] = [
+/// Options that do not apply to a baseline.
+const CONFLICTS_WITH_BASELINE: [&str; 16] = [
     "prior",
     "prior_model",
     "head_model",
@@ -119,11 +119,15 @@ const NOT_OF_A_BASELINE: [&str; 16] = [
 ];
 
 impl MethodArgs {
-    /// For the library; models are opened.
+    /// Options for the library; opens the models.
     pub(crate) fn options(&self) -> job::Result<Options> {
-        if (self.prior == Prior::Onnx) != self.prior_model.is_some() {
-            let message = "--prior onnx and --prior-model M.onnx go together".into();
-            return Err(Failure { message, code: USAGE });
+        let mismatch = match (self.prior == Prior::Onnx, self.prior_model.is_some()) {
+            (true, false) => Some("--prior onnx needs a network: --prior-model M.onnx"),
+            (false, true) => Some("--prior-model M.onnx is used only with --prior onnx"),
+            _ => None,
+        };
+        if let Some(message) = mismatch {
+            return Err(Failure { message: message.into(), code: USAGE });
         }
         let model = |path: &Path| Model::open(path, &self.model_options());
         let (prior_model, head_model) = (self.prior_model.as_deref(), self.head_model.as_deref());
@@ -134,12 +138,12 @@ impl MethodArgs {
         })
     }
 
-    /// Whether nothing was said of how to reconstruct, but which networks there are.
+    /// Whether all options, apart from those of networks, have their default values.
     pub(crate) fn is_silent(&self) -> bool {
         self.plain_options() == Options::default() && self.cloud.is_none()
     }
 
-    /// How networks are opened.
+    /// Options with which networks are opened.
     pub(crate) fn model_options(&self) -> ModelOptions {
         ModelOptions {
             runtime: self.onnxruntime.clone(),
@@ -150,7 +154,7 @@ impl MethodArgs {
         }
     }
 
-    /// Without models.
+    /// Options for the library without models.
     fn plain_options(&self) -> Options {
         let kept = |item: KeepItem| self.keep.contains(&item) || self.keep.contains(&KeepItem::All);
         Options {
@@ -214,12 +218,12 @@ impl MethodArgs {
         }
     }
 
-    /// The files that are read beside a scene.
+    /// Files that are read in addition to the scene.
     pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
         [&self.cloud, &self.prior_model, &self.head_model, &self.onnxruntime].into_iter().flatten()
     }
 
-    /// Whether depth of the scene is read.
+    /// Whether the scene's depth is read.
     pub(crate) fn wants_depth(&self) -> bool {
         matches!(self.prior, Prior::Auto | Prior::Given) && self.baseline.is_none()
     }
@@ -261,7 +265,7 @@ enum Calibration {
     Off,
 }
 
-/// Methods to compare with.
+/// Methods for comparison.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Baseline {
     #[value(name = "3dgs")]

@@ -17,7 +17,7 @@ use values::{Names, backend, background, names, picture_size, positive, refineme
 use vg::refine::Amount;
 use vg::render::{Backend, Background};
 
-/// Reconstructs a vehicle from posed, masked photographs of one side as metric 3D Gaussians.
+/// Reconstructs a vehicle as metric 3D Gaussians from posed, masked photographs of one side.
 #[derive(Parser)]
 #[command(name = "vg", version, after_help = EXIT_CODES, arg_required_else_help = true, infer_long_args = false)]
 pub(crate) struct Cli {
@@ -25,44 +25,44 @@ pub(crate) struct Cli {
     pub(crate) command: Command,
 }
 
-const EXIT_CODES: &str = "Exit codes: 0 the job is done; 1 it failed (bad data, a file that cannot be read or \
-written); 2 the arguments make no sense; 130 interrupted, 143 terminated, 129 hung up.\nA result named - goes to \
-standard output, and nothing else does.\nErrors are one line on standard error: vg: error: <cause>.";
+const EXIT_CODES: &str = "Exit codes: 0 success; 1 failure (bad data, a file that cannot be read or written); \
+2 invalid arguments; 130 interrupted, 143 terminated, 129 hung up.\nAn output file named - is standard output, which \
+then holds nothing else.\nErrors are one line on standard error: vg: error: <cause>.";
 
 #[derive(Subcommand)]
 pub(crate) enum Command {
     /// Make a Gaussian model of the vehicle in a scene
     Reconstruct(ReconstructArgs),
-    /// Move a model that is there already towards a scene's photographs
+    /// Optimise an existing model against a scene's photographs
     Refine(RefineArgs),
-    /// Draw a model as a scene's cameras see it, or all around it
+    /// Render a model from a scene's cameras, or from all around
     Render(RenderArgs),
-    /// Tell what is in a PLY file, and what is wrong with it
+    /// Describe a PLY file and its problems
     Info(InfoArgs),
-    /// Reconstruct from some views of scenes and measure the error in others
+    /// Reconstruct from some views of scenes and measure the error in the others
     Eval(EvalArgs),
     /// Measure error against run time over a sweep of settings
     Pareto(ParetoArgs),
-    /// Reconstruct, and show on one HTML page what went in, what came out and how far off it is
+    /// Reconstruct, and write one HTML page with inputs, result, errors and times
     Report(ReportArgs),
-    /// Run the whole job on the sample inside this program
+    /// Run the whole pipeline on the bundled sample
     Demo(DemoArgs),
-    /// Find the similarity from a scene's world to the vehicle's frame: by a scan, camera centres, a box, or a matrix
+    /// Find the similarity from a scene's world to the vehicle's frame, from a scan, camera centres, a box or a matrix
     Align(AlignArgs),
 }
 
-/// What a scene's files do not say.
+/// Frame of a scene, which its files do not define.
 #[derive(Args)]
 pub(crate) struct FrameArgs {
-    /// Similarity from the scene's world to the vehicle's frame, JSON; a COLMAP model needs one
+    /// Similarity from the scene's world to the vehicle's frame, JSON; required for a COLMAP model
     #[arg(long, value_name = "FILE")]
     pub(crate) vehicle_from_world: Option<PathBuf>,
 }
 
-/// Which of the scene's views.
+/// Selection of the scene's views.
 #[derive(Args)]
 pub(crate) struct ViewsArgs {
-    /// Views to use, by path, file name, or file name without extension; all if not given. May be repeated; a comma
+    /// Views to use, by path, file name, or file name without extension [default: all]. May be repeated; a comma
     /// inside a name is written \,
     #[arg(long, value_name = "NAME,NAME,...", value_parser = names)]
     views: Option<Vec<Names>>,
@@ -76,18 +76,18 @@ impl ViewsArgs {
     }
 }
 
-/// Numbers in depth files.
+/// Unit of depth files.
 #[derive(Args)]
 pub(crate) struct DepthArgs {
-    /// Metres per number in the depth files, instead of what the scene says
+    /// Metres per unit of the depth files; overrides the scene's value
     #[arg(long, value_name = "METRES", value_parser = positive)]
     pub(crate) depth_scale: Option<f64>,
 }
 
-/// What becomes of a result that is not to be believed.
+/// Rejection of results with a poor verdict.
 #[derive(Args)]
 pub(crate) struct StrictArgs {
-    /// Fail and write nothing where the verdict is not good; with =bad, only where it is bad
+    /// Fail and write nothing unless the verdict is good; with =bad, only if it is bad
     #[arg(
         long,
         value_name = "doubtful|bad",
@@ -99,18 +99,18 @@ pub(crate) struct StrictArgs {
     pub(crate) strict: Option<Strict>,
 }
 
-/// From which verdict on a job fails.
+/// Mildest verdict that makes a job fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Strict {
-    /// Doubtful and bad, and unchecked for a budget.
+    /// Doubtful, bad, and unchecked (where the budget left no time to check).
     Doubtful,
-    /// Bad alone.
+    /// Only bad.
     Bad,
 }
 
 #[derive(Args)]
 pub(crate) struct ReconstructArgs {
-    /// A transforms.json, a folder with one, or a COLMAP folder (images/, masks/, sparse/0)
+    /// A transforms.json, a folder that holds one, or a COLMAP folder (images/, masks/, sparse/0)
     pub(crate) scene: PathBuf,
     #[command(flatten)]
     pub(crate) views: ViewsArgs,
@@ -120,27 +120,27 @@ pub(crate) struct ReconstructArgs {
     pub(crate) frame: FrameArgs,
     #[command(flatten)]
     pub(crate) depth: DepthArgs,
-    /// A segmentation network, an ONNX file in the contract of docs/ONNX.md, for the views that have no mask
+    /// Segmentation network for views without a mask: an ONNX file that meets the contract of docs/ONNX.md
     #[arg(long, value_name = "M.onnx")]
     pub(crate) mask_model: Option<PathBuf>,
     /// The model, a PLY file in 3DGS's layout
     #[arg(short, long, value_name = "ASSET.ply")]
     pub(crate) output: PathBuf,
-    /// Write the metric coloured point cloud as well
+    /// Also write the metric coloured point cloud
     #[arg(long, value_name = "P.ply", conflicts_with = "baseline")]
     pub(crate) points: Option<PathBuf>,
-    /// Do not draw the model into the input views to report the error there: about twice as fast with given depth
+    /// Skip the error check in the input views: about twice as fast with given depth
     #[arg(long, conflicts_with = "strict")]
     pub(crate) no_check: bool,
     #[command(flatten)]
     pub(crate) strict: StrictArgs,
-    /// Write what was done: settings, stage times, counts, what was left out and why, errors
+    /// Write a report as JSON: settings, stage times, counts, what was left out and why, errors
     #[arg(long, value_name = "R.json")]
     pub(crate) report: Option<PathBuf>,
-    /// For a process that another one started: the similarity itself, 16 numbers
+    /// For a child process: the similarity itself, 16 numbers
     #[arg(long, hide = true, conflicts_with = "vehicle_from_world")]
     pub(crate) frame_matrix: Option<String>,
-    /// For such a process: end when standard input ends
+    /// For a child process: end when standard input ends
     #[arg(long, hide = true)]
     pub(crate) end_with_input: bool,
 }
@@ -155,26 +155,25 @@ pub(crate) struct RefineArgs {
     pub(crate) views: ViewsArgs,
     #[command(flatten)]
     pub(crate) frame: FrameArgs,
-    /// So many steps, or as many as fit into so many seconds (5s)
+    /// Number of steps (300) or of seconds (5s)
     #[arg(long, value_name = "N|SECONDSs", default_value = "300", value_parser = refinement)]
     pub(crate) amount: Amount,
-    /// Keep one of three or more views out of the optimisation, to tell when to stop
+    /// Hold one of three or more views out of the optimisation, to decide when to stop
     #[arg(long)]
     pub(crate) hold_out: bool,
-    /// Let Gaussians divide and go, as 3D Gaussian splatting does
+    /// Split, clone and prune Gaussians, as 3D Gaussian splatting does
     #[arg(long)]
     pub(crate) densify: bool,
-    /// Who draws and goes back: the processor, a graphics processor in a build that has one, or what is known to pay
-    /// (auto: the processor)
+    /// Device for rendering and gradients: cpu, gpu (in a build with GPU support), or auto, at present the CPU
     #[arg(long, value_name = "auto|cpu|gpu", default_value = "auto", value_parser = backend)]
     pub(crate) backend: Backend,
     /// Worker threads; 0 means one per core
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) threads: usize,
-    /// The refined model
+    /// Output file of the refined model
     #[arg(short, long, value_name = "ASSET.ply")]
     pub(crate) output: PathBuf,
-    /// Write what was done
+    /// Write a report as JSON: settings, steps, errors
     #[arg(long, value_name = "R.json")]
     pub(crate) report: Option<PathBuf>,
 }
@@ -184,27 +183,27 @@ pub(crate) struct RefineArgs {
 pub(crate) struct RenderArgs {
     /// The model, a PLY file in 3DGS's layout
     pub(crate) asset: PathBuf,
-    /// Draw what the cameras of this scene see: <image stem>.png each, with the folders of the pictures' names where
-    /// two would be called the same
+    /// Render from the cameras of this scene: <image stem>.png each, with the folders of the image names where two
+    /// would have the same name
     #[arg(long, value_name = "SCENE")]
     pub(crate) cameras: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) views: ViewsArgs,
     #[command(flatten)]
     pub(crate) frame: FrameArgs,
-    /// Draw N pictures from all around instead
+    /// Render N pictures from all around instead
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with_all = ["views", "vehicle_from_world"])]
     pub(crate) turntable: Option<u32>,
     /// Size of the turntable's pictures, pixels
     #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = picture_size, conflicts_with = "cameras")]
     pub(crate) size: (u32, u32),
-    /// What is behind the vehicle; a colour as three numbers from 0 to 255
+    /// Background; a colour is three numbers from 0 to 255
     #[arg(long, value_name = "white|black|R,G,B|transparent", default_value = "white", value_parser = background)]
     pub(crate) background: Background,
-    /// Write depth too, under the same names in DIR/depth: 16-bit millimetres, 0 = none
+    /// Also write depth, under the same names in DIR/depth: 16-bit millimetres, 0 = none
     #[arg(long)]
     pub(crate) depth: bool,
-    /// Who draws: the CPU, a graphics processor, or what is best of what this build and this machine have
+    /// Renderer: cpu, gpu, or auto, the best that this build and this machine have
     #[arg(long, value_name = "auto|cpu|gpu", default_value = "auto", value_parser = backend)]
     pub(crate) backend: Backend,
     /// Worker threads; 0 means one per core
@@ -217,13 +216,13 @@ pub(crate) struct RenderArgs {
 
 #[derive(Args)]
 pub(crate) struct InfoArgs {
-    /// Gaussians or a point cloud, PLY
+    /// PLY file of Gaussians or of a point cloud
     pub(crate) file: PathBuf,
 }
 
 #[derive(Args)]
 pub(crate) struct DemoArgs {
-    /// Folder for what the demo makes
+    /// Output folder
     #[arg(default_value = "vg-demo")]
     pub(crate) folder: PathBuf,
     /// Worker threads; 0 means one per core

@@ -10,11 +10,11 @@ pub(crate) struct ReportArgs {
     pub(crate) scene: PathBuf,
     #[command(flatten)]
     pub(crate) views: ViewsArgs,
-    /// As for `eval`: the inputs are reconstructed and the test views judged; split.json if there is one here or in
-    /// the scene's folder
+    /// Split, as for `eval`: the input views are reconstructed and the test views measured [default: split.json here or
+    /// in the scene's folder, if there is one]
     #[arg(long, value_name = "FILE", conflicts_with = "views")]
     pub(crate) split: Option<PathBuf>,
-    /// This key of the split; the first if not given
+    /// Key of the split [default: the first]
     #[arg(long, value_name = "KEY", conflicts_with = "views")]
     pub(crate) only: Option<String>,
     #[command(flatten)]
@@ -25,7 +25,7 @@ pub(crate) struct ReportArgs {
     pub(crate) depth: DepthArgs,
     #[command(flatten)]
     pub(crate) strict: StrictArgs,
-    /// The page
+    /// Output file of the page
     #[arg(short, long, value_name = "PAGE.html")]
     pub(crate) output: PathBuf,
 }

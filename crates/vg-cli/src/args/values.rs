@@ -1,16 +1,16 @@
-//! Values on the command line that are more than a number or a name.
+//! Parsers of command-line values that are more than a number or a name.
 
 use vg::pipeline::Options;
 use vg::refine::{Amount, RefineOptions};
 use vg::render::{Backend, Background};
 use vg::scene::{Place, VehicleBox};
 
-/// Length, width, height in metres. A type of its own: the parser would take an array for a list of values.
+/// Length, width, height in metres. A type of its own because clap treats an array as a list of values.
 #[derive(Clone, Copy)]
 pub(super) struct VehicleSize(pub(super) [f64; 3]);
 
 pub(super) fn vehicle_size(text: &str) -> Result<VehicleSize, String> {
-    let size = numbers::<f64>(text).ok_or("expected three numbers, length,width,height in metres")?;
+    let size = numbers::<f64>(text).ok_or("expected length,width,height in metres, three numbers")?;
     match (Options { vehicle_size: Some(size), ..Options::default() }).validate() {
         Ok(()) => Ok(VehicleSize(size)),
         Err(vg::Error::Argument { allowed, .. }) => Err(format!("expected {allowed}")),
@@ -18,13 +18,12 @@ pub(super) fn vehicle_size(text: &str) -> Result<VehicleSize, String> {
     }
 }
 
-/// A box, and where it stands if that is said. A type of its own for the same reason.
+/// A box, and its pose if given. A type of its own, as [`VehicleSize`] is.
 #[derive(Clone, Copy)]
 pub(super) struct KnownBox(pub(super) VehicleBox);
 
 pub(super) fn known_box(text: &str) -> Result<KnownBox, String> {
-    const EXPECTED: &str =
-        "expected length,width,height in metres, or these and x,y,z of the centre and the yaw in radians";
+    const EXPECTED: &str = "expected length,width,height in metres, optionally followed by the centre's x,y,z and the yaw in radians";
     let numbers: Vec<f64> =
         text.split(',').map(|part| part.trim().parse()).collect::<Result<_, _>>().map_err(|_| EXPECTED)?;
     let known = match numbers[..] {
@@ -41,7 +40,7 @@ pub(super) fn known_box(text: &str) -> Result<KnownBox, String> {
     }
 }
 
-/// Names with commas between; `\,` is a comma inside a name. A type of its own: the parser would take a list for one of
+/// Names separated by commas; `\,` is a comma inside a name. A type of its own because clap treats a `Vec` as a list of
 /// values.
 #[derive(Clone)]
 pub(super) struct Names(pub(super) Vec<String>);
@@ -63,7 +62,7 @@ pub(super) fn names(text: &str) -> Result<Names, String> {
     }
     names.last_mut().ok_or("expected a name")?.push_str(rest);
     match names.iter().any(String::is_empty) {
-        true => Err("expected names with commas between, and \\, for a comma inside a name".into()),
+        true => Err("expected names separated by commas, with \\, for a comma inside a name".into()),
         false => Ok(Names(names)),
     }
 }
@@ -88,7 +87,7 @@ pub(super) fn backend(text: &str) -> Result<Backend, String> {
     }
 }
 
-/// Three numbers with commas between.
+/// Three numbers separated by commas.
 fn numbers<T: std::str::FromStr>(text: &str) -> Option<[T; 3]> {
     let numbers: Vec<T> = text.split(',').map(|part| part.trim().parse()).collect::<Result<_, _>>().ok()?;
     numbers.try_into().ok()
@@ -99,7 +98,7 @@ pub(super) fn picture_size(text: &str) -> Result<(u32, u32), String> {
         |text: &str| text.parse().ok().filter(|side| (1..=vg::geometry::camera::MAX_SIDE).contains(side));
     text.split_once('x')
         .and_then(|(w, h)| Some((side(w)?, side(h)?)))
-        .ok_or_else(|| format!("expected WxH, each 1 to {}", vg::geometry::camera::MAX_SIDE))
+        .ok_or_else(|| format!("expected WxH, each from 1 to {}", vg::geometry::camera::MAX_SIDE))
 }
 
 pub(super) fn positive(text: &str) -> Result<f64, String> {
@@ -124,7 +123,7 @@ pub(super) fn refinement(text: &str) -> Result<Amount, String> {
 
 pub(super) fn share(text: &str) -> Result<f64, String> {
     let inside = |share: &f64| *share > 0.0 && *share <= 1.0;
-    text.parse().ok().filter(inside).ok_or_else(|| "expected a number above 0, at most 1".into())
+    text.parse().ok().filter(inside).ok_or_else(|| "expected a number above 0 and at most 1".into())
 }
 
 pub(super) fn at_least_one(text: &str) -> Result<usize, String> {
@@ -136,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn commas_divide_names_unless_they_are_escaped() {
+    fn commas_separate_names_unless_they_are_escaped() {
         let read = |text: &str| names(text).map(|n| n.0);
         assert_eq!(read("a.png,b").unwrap(), ["a.png", "b"]);
         assert_eq!(read(r"a\,b.png,c\d").unwrap(), ["a,b.png", r"c\d"]);

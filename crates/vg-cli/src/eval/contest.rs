@@ -1,12 +1,12 @@
-//! All systems in all splits of all vehicles, in turns.
+//! Measures all systems in all splits of all vehicles.
 //!
-//! Repeats are interleaved: every system once, then every system again, so that a machine that is busy for a while does
-//! not wrong one of them. Results are deterministic, so errors are measured in the first round only.
+//! Repeats are interleaved: every system once, then every system again, so that a temporary load on the machine does
+//! not bias the times of one system. Results are deterministic, so errors are measured in the first round only.
 
-use super::judge::{Judge, OfVehicle};
-use super::measure::{self, Measured, Shown};
+use super::judge::{Judge, References};
+use super::measure::{self, Measured, MethodInput};
 use super::split::{self, Split};
-use super::system::{Maker, Method, Side, System, Takes};
+use super::system::{Maker, Method, Side, SplitFilter, System};
 use super::vehicles::{self, Vehicle};
 use crate::args::{JudgeArgs, VehiclesArgs};
 use crate::job::{self, Failure, Result};
@@ -20,22 +20,22 @@ use vg::onnx::ModelOptions;
 use vg::progress::Threads;
 use vg::scene::Cloud;
 
-/// What became of one system.
+/// Result of one system.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Row {
     pub(crate) system: String,
-    /// Splits that were measured.
+    /// Number of splits that were measured.
     pub(crate) splits: usize,
-    /// Why there is no number, or none of some splits.
+    /// Reasons why all or some splits have no numbers.
     pub(crate) missing: Vec<String>,
-    /// Mean over the splits of the median over the repeats; of an import what its maker said.
+    /// Mean over the splits of the median over the repeats; for an import, the time that was given with it.
     pub(crate) seconds: Option<f64>,
-    /// Of the means over the splits, the least and the most of the repeats.
+    /// Smallest and largest over the repeats of the mean over the splits.
     pub(crate) seconds_range: Option<[f64; 2]>,
-    /// Standard error of the mean PSNR over the splits; `None` of one split.
+    /// Standard error of the mean PSNR over the splits; `None` for a single split.
     pub(crate) psnr_standard_error_db: Option<f64>,
-    /// Most memory of a process that reads the first split's views and reconstructs from them, bytes; `None` where the
-    /// system does not tell, and of what was made elsewhere.
+    /// Peak memory of a process that reads the first split's views and reconstructs from them, bytes; `None` where the
+    /// operating system does not report it, and for imports.
     pub(crate) peak_bytes: Option<u64>,
     /// Means over the splits.
     #[serde(flatten)]
@@ -44,25 +44,25 @@ pub(crate) struct Row {
     pub(crate) each: Vec<InSplit>,
 }
 
-/// What one system did in one split.
+/// Result of one system in one split.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct InSplit {
     scene: String,
     split: String,
-    /// Of each repeat.
+    /// Seconds of each repeat.
     seconds: Vec<f64>,
     #[serde(flatten)]
     measured: Measured,
 }
 
 impl InSplit {
-    /// Scene, split, and its numbers.
+    /// The scene, the split and the numbers.
     pub(crate) fn parts(&self) -> (&str, &str, &Measured) {
         (&self.scene, &self.split, &self.measured)
     }
 }
 
-/// A vehicle that was aligned first.
+/// Quality of a vehicle's alignment to its scan.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Aligned {
     scene: String,
@@ -77,18 +77,18 @@ pub(crate) struct Broken {
     pub(crate) error: String,
 }
 
-/// Rows in the order of the systems, and what was in the way.
+/// Rows in the order of the systems, and the vehicles that failed.
 pub(crate) struct Contest {
     pub(crate) rows: Vec<Row>,
     pub(crate) errors: Vec<Broken>,
     /// How well each vehicle fits the scan that it was aligned to.
     pub(crate) aligned: Vec<Aligned>,
-    /// The network that LPIPS is by, where it was measured.
+    /// Name of the LPIPS network, where LPIPS was measured.
     pub(crate) lpips_net: Option<String>,
 }
 
 impl Contest {
-    /// Everything that could be asked was answered.
+    /// Whether everything that could be measured was measured.
     pub(crate) fn is_complete(&self, systems: &[System]) -> bool {
         let is_whole = |(row, system): (&Row, &System)| {
             row.missing.is_empty() || matches!(system.maker, Maker::Missing(_))
@@ -97,17 +97,17 @@ impl Contest {
     }
 }
 
-/// What was measured of one system so far.
+/// Measurements of one system so far.
 #[derive(Default)]
 struct Runs {
     each: Vec<InSplit>,
     missing: Vec<String>,
-    /// Of the first split.
+    /// Peak memory of the first split.
     peak_bytes: Option<u64>,
 }
 
-/// Measures; vehicles and systems that fail are told and left out.
-pub(crate) fn hold(
+/// Measures all systems; vehicles and systems that fail are reported and left out.
+pub(crate) fn run(
     vehicles: &VehiclesArgs,
     judge: &JudgeArgs,
     models: &ModelOptions,
@@ -125,15 +125,15 @@ pub(crate) fn hold(
                 let scene = vehicle.name.clone();
                 Aligned { scene, residual_m, confidence }
             }));
-            one(&vehicle, &judge, systems, repeat, &threads, &mut runs)
+            measure_vehicle(&vehicle, &judge, systems, repeat, &threads, &mut runs)
         });
         match measured {
-            Ok(()) => job::warn(),
-            // One scene alone is the job itself.
+            Ok(()) => job::print_warnings(),
+            // With a single scene, its failure is the command's failure.
             Err(failure) if scenes.len() == 1 => return Err(failure),
             Err(failure) => {
                 let shown = scene.display().to_string();
-                job::complain(&format!("{shown}: {}", failure.message));
+                job::print_error(&format!("{shown}: {}", failure.message));
                 errors.push(Broken { scene: shown, error: failure.message });
             }
         }
@@ -142,31 +142,27 @@ pub(crate) fn hold(
     Ok(Contest { rows, errors, aligned, lpips_net: judge.lpips_net().map(Into::into) })
 }
 
-/// The most threads that one of the systems works on; 0, which is all cores, where one does.
+/// Largest thread count of the systems; 0 (all cores) where one of them asks for all cores.
 fn most_threads(systems: &[System]) -> usize {
-    let of = |system: &System| match &system.maker {
+    let threads = |system: &System| match &system.maker {
         Maker::Method(method) => method.settings.threads,
         Maker::Import(_) | Maker::Missing(_) => 0,
     };
-    let all: Vec<usize> = systems.iter().map(of).collect();
+    let all: Vec<usize> = systems.iter().map(threads).collect();
     if all.contains(&0) { 0 } else { all.into_iter().max().unwrap_or(0) }
 }
 
-/// Runs `work` on as many threads as a method asks for: `threads` where they are as many.
-fn on_threads_of<T>(
-    method: &Method,
-    threads: &Threads,
-    work: impl FnOnce(&Threads) -> Result<T>,
-) -> Result<T> {
+/// Runs `work` on the number of threads that the method sets; on `threads` where that pool has as many.
+fn on_threads<T>(method: &Method, threads: &Threads, work: impl FnOnce(&Threads) -> Result<T>) -> Result<T> {
     match method.settings.threads {
-        // Where one asks for all cores, these are all.
+        // Where a method asks for all cores, `threads` has all of them.
         count if count == 0 || count == threads.count() => work(threads),
         count => work(&Threads::new(count)?),
     }
 }
 
-/// All systems in a vehicle's splits. A method works on as many threads as it asks for, all else on `threads`.
-fn one(
+/// Measures all systems in a vehicle's splits. A method runs on its own number of threads, the rest on `threads`.
+fn measure_vehicle(
     vehicle: &Vehicle,
     judge: &Judge,
     systems: &[System],
@@ -174,29 +170,29 @@ fn one(
     threads: &Threads,
     runs: &mut [Runs],
 ) -> Result<()> {
-    let judge: OfVehicle = judge.of(&vehicle.scene)?;
-    // A cause that several systems meet is told once.
-    let mut said = HashSet::new();
+    let judge: References = judge.references(&vehicle.scene)?;
+    // A cause that several systems share is reported once.
+    let mut reported = HashSet::new();
     for (key, split) in &vehicle.splits {
-        // What is wrong with the photographs is not the systems' fault.
+        // Errors of the photographs are the vehicle's, not a system's: open them first.
         let views = split.input.iter().chain(&split.test).cloned().collect::<Vec<_>>();
         scene::open(&vehicle.scene, &views, &vehicle.options(None), threads)?;
         let mut timed = Vec::new();
         for (system, runs) in systems.iter().zip(runs.iter_mut()) {
-            let Some(split) = system.takes.split(vehicle, split)? else { continue };
+            let Some(split) = system.splits.apply(vehicle, split)? else { continue };
             let measured = match &system.maker {
                 Maker::Missing(_) => continue,
                 Maker::Import(import) => import
                     .model(vehicle, key, &split, judge.scan.as_ref(), threads)
                     .and_then(|made| {
                         let options = vehicle.options(None);
-                        let from = Shown::plain(&vehicle.scene, &options);
+                        let from = MethodInput::plain(&vehicle.scene, &options);
                         measure::model(&from, &split, &made, &judge, threads)
                     })
                     .map(|m| Measured { reconstruct_ms: import.seconds.map(|s| 1e3 * s), ..m }),
-                Maker::Method(method) => on_threads_of(method, threads, |own| {
-                    shown(vehicle, method, |shown| {
-                        measure::split(shown, &split, &method.settings, &judge, own)
+                Maker::Method(method) => on_threads(method, threads, |own| {
+                    with_input(vehicle, method, |input| {
+                        measure::split(input, &split, &method.settings, &judge, own)
                     })
                 }),
             };
@@ -212,11 +208,11 @@ fn one(
                         timed.push((method, split, runs));
                     }
                 }
-                // One system alone is the job itself.
+                // With a single system, its failure is the command's failure.
                 Err(failure) if systems.len() == 1 => return Err(failure),
                 Err(failure) => {
-                    if said.insert(failure.message.clone()) {
-                        job::complain(&format!(
+                    if reported.insert(failure.message.clone()) {
+                        job::print_error(&format!(
                             "{}, {key}, {}: {}",
                             vehicle.name, system.name, failure.message
                         ));
@@ -227,8 +223,8 @@ fn one(
         }
         for _ in 1..repeat {
             for (method, split, runs) in &mut timed {
-                let ms = on_threads_of(method, threads, |own| {
-                    shown(vehicle, method, |shown| measure::time(shown, split, &method.settings, own))
+                let ms = on_threads(method, threads, |own| {
+                    with_input(vehicle, method, |input| measure::time(input, split, &method.settings, own))
                 })?;
                 runs.each.last_mut().expect("the first round made it").seconds.push(ms / 1e3);
             }
@@ -237,26 +233,30 @@ fn one(
     Ok(())
 }
 
-/// `None` for what `vg reconstruct` cannot be asked to do.
+/// Peak memory of the reconstruction, bytes; `None` for settings that `vg reconstruct` does not have.
 fn peak_bytes(vehicle: &Vehicle, split: &Split, method: &Method) -> Option<u64> {
     let words = method.words.as_ref().filter(|_| method.cloud_points.is_none())?;
     let source = vehicle.source().ok()?;
     let mut all: Vec<OsString> = vec![source.into(), "--views".into(), split.input.join(",").into()];
     all.extend(words.iter().cloned());
-    memory::of_reconstruction(all, vehicle.vehicle_from_world.as_ref())
+    memory::reconstruction_peak(all, vehicle.vehicle_from_world.as_ref())
 }
 
-/// Opens what a method is shown of a vehicle.
-fn shown<T>(vehicle: &Vehicle, method: &Method, work: impl FnOnce(&Shown) -> Result<T>) -> Result<T> {
+/// Opens a method's input of a vehicle and runs `work` on it.
+fn with_input<T>(
+    vehicle: &Vehicle,
+    method: &Method,
+    work: impl FnOnce(&MethodInput) -> Result<T>,
+) -> Result<T> {
     let read = |file: &std::path::PathBuf| cloud::read(&split::find(file, &vehicle.scene));
     let cloud: Option<Cloud> = method.cloud.as_ref().map(read).transpose()?;
     let (scene, options): (&Path, _) = (&vehicle.scene, &vehicle.options(method.depth_scale));
-    work(&Shown { scene, options, cloud: cloud.as_ref(), cloud_points: method.cloud_points })
+    work(&MethodInput { scene, options, cloud: cloud.as_ref(), cloud_points: method.cloud_points })
 }
 
-impl Takes {
-    /// The split as this system takes it; `None` if it does not.
-    fn split(self, vehicle: &Vehicle, split: &Split) -> Result<Option<Split>> {
+impl SplitFilter {
+    /// The split with this system's test views; `None` if the system is not measured in it.
+    fn apply(self, vehicle: &Vehicle, split: &Split) -> Result<Option<Split>> {
         if let Some(side) = self.side {
             let is_left = vehicle.side(&split.input)? > 0.0;
             if is_left != (side == Side::Left) {
@@ -271,7 +271,9 @@ impl Takes {
         test.dedup();
         test.retain(|view| !split.input.contains(view));
         if test.is_empty() {
-            return Err(Failure::job("no test view that is not an input as well"));
+            return Err(Failure::job(
+                "every test view is also an input view; expected at least one that is not",
+            ));
         }
         Ok(Some(Split { input: split.input.clone(), test }))
     }
@@ -283,7 +285,7 @@ impl Runs {
         if let Maker::Missing(why) = &system.maker {
             missing.push(why.clone());
         } else if self.each.is_empty() && missing.is_empty() {
-            missing.push("no vehicle has such a split".into());
+            missing.push("no vehicle has a split with input views on this side".into());
         }
         let measured: Vec<&Measured> = self.each.iter().map(|e| &e.measured).collect();
         let mean = measure::mean(&measured);
@@ -292,8 +294,8 @@ impl Runs {
         let squares = measured.iter().map(|m| (m.errors.psnr_db - psnr).powi(2)).sum::<f64>();
 
         let repeats = self.each.iter().map(|e| e.seconds.len()).min().unwrap_or(0);
-        let of_repeat = |r: usize| self.each.iter().map(|e| e.seconds[r]).sum::<f64>() / count;
-        let means: Vec<f64> = (0..repeats).map(of_repeat).collect();
+        let mean_of_repeat = |r: usize| self.each.iter().map(|e| e.seconds[r]).sum::<f64>() / count;
+        let means: Vec<f64> = (0..repeats).map(mean_of_repeat).collect();
         let medians = self.each.iter().map(|e| measure::median(&mut e.seconds.clone()));
         let least = means.iter().copied().fold(f64::INFINITY, f64::min);
         let most = means.iter().copied().fold(0.0, f64::max);

@@ -11,30 +11,30 @@ use vg::progress::Threads;
 use vg::scene::Cloud;
 use vg::{Gaussians, View};
 
-/// Where the models of one program are.
+/// Location of the models that one program made.
 pub(crate) struct Import {
     kind: Kind,
-    /// With `{scene}` and `{split}` in it.
+    /// Path that may contain `{scene}` and `{split}`.
     pattern: String,
-    /// What one model took, as its maker measured it.
+    /// Time for one model, as given by the user.
     pub(crate) seconds: Option<f64>,
 }
 
-/// What a program writes.
+/// Format and frame of a program's models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// Depth Anything 3: a PLY for each view, in the cameras' world.
     DepthAnything3,
     /// TRELLIS: one object of unknown size and heading, -y up.
     Trellis,
-    /// The same with z up.
+    /// One object of unknown size and heading, z up.
     Object,
-    /// In the vehicle's frame, metres.
+    /// A model in the vehicle's frame, metres.
     Vehicle,
 }
 
 impl Import {
-    /// Of `NAME: KIND PATH [seconds=S]`.
+    /// Parses `NAME: KIND PATH [seconds=S]`.
     pub(crate) fn read(text: &str) -> Result<(String, Self)> {
         let wrong = |what: &str| Failure {
             message: format!(
@@ -43,25 +43,26 @@ impl Import {
             ),
             code: USAGE,
         };
-        let (name, rest) = text.split_once(':').ok_or_else(|| wrong("no name before a colon"))?;
-        let (kind, rest) = rest.trim().split_once(char::is_whitespace).ok_or_else(|| wrong("no path"))?;
+        let (name, rest) = text.split_once(':').ok_or_else(|| wrong("found no colon after a name"))?;
+        let (kind, rest) =
+            rest.trim().split_once(char::is_whitespace).ok_or_else(|| wrong("found no path"))?;
         let kind = match kind {
             "da3" => Kind::DepthAnything3,
             "trellis" => Kind::Trellis,
             "object" => Kind::Object,
             "vehicle" => Kind::Vehicle,
-            _ => return Err(wrong("no such kind")),
+            _ => return Err(wrong("unknown KIND")),
         };
         let rest = rest.trim();
         let (pattern, seconds) = match rest.rsplit_once("seconds=") {
             Some((pattern, seconds)) => {
                 let seconds = seconds.parse().ok().filter(|s: &f64| *s > 0.0 && s.is_finite());
-                (pattern.trim(), Some(seconds.ok_or_else(|| wrong("seconds is no number above 0"))?))
+                (pattern.trim(), Some(seconds.ok_or_else(|| wrong("seconds is not a number above 0"))?))
             }
             None => (rest, None),
         };
         if pattern.is_empty() {
-            return Err(wrong("no path"));
+            return Err(wrong("found no path"));
         }
         Ok((name.trim().to_owned(), Self { kind, pattern: pattern.to_owned(), seconds }))
     }
@@ -74,7 +75,7 @@ impl Import {
         PathBuf::from(self.pattern.replace("{scene}", scene).replace("{split}", key))
     }
 
-    /// The files of a split's model, cameras beside it included.
+    /// The files of a split's model, including its cameras.
     pub(crate) fn files(&self, scene: &str, key: &str) -> Vec<PathBuf> {
         let path = self.path(scene, key);
         match std::fs::read_dir(&path) {
@@ -98,10 +99,10 @@ impl Import {
         }
         let views = scene::open(&vehicle.scene, &split.input, &vehicle.options(None), threads)?.scene.views;
         if self.kind == Kind::DepthAnything3 {
-            return threads.run(|| of_views(&path, &views, vehicle));
+            return threads.run(|| read_views(&path, &views, vehicle));
         }
         let scan = scan.ok_or_else(|| {
-            Failure::job("has no frame of its own and is fitted to a scan: needs --scan P.ply")
+            Failure::job("the model has no metric frame and must be fitted to a scan: give --scan P.ply")
         })?;
         let up = if self.kind == Kind::Trellis { Up::MinusY } else { Up::Z };
         let object = read(&path)?;
@@ -110,9 +111,9 @@ impl Import {
     }
 }
 
-/// A PLY for each view in a folder, or one of all, in the world of the scene's poses, or in that of the camera centres
-/// beside them.
-fn of_views(path: &Path, views: &[View], vehicle: &Vehicle) -> Result<Gaussians> {
+/// Reads a folder with a PLY for each view, or one PLY for all, in the world of the scene's poses, or of the camera
+/// centres in the cameras file next to them.
+fn read_views(path: &Path, views: &[View], vehicle: &Vehicle) -> Result<Gaussians> {
     let cameras = if path.is_dir() { path.join("cameras.json") } else { path.with_extension("cameras.json") };
     let centers = cameras.is_file().then(|| vg::io::read_known_centers(&cameras)).transpose()?;
     let parts = if path.is_dir() {

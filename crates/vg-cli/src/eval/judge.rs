@@ -1,4 +1,4 @@
-//! What results are compared with beside photographs, masks and depth.
+//! References, besides photographs, masks and depth, that results are compared with.
 
 use super::split;
 use crate::args::JudgeArgs;
@@ -9,16 +9,16 @@ use vg::metrics::Lpips;
 use vg::onnx::ModelOptions;
 use vg::scene::Cloud;
 
-/// As the command line has it; scans are looked for beside each scene.
+/// References as given on the command line; a scan is also looked up in each scene's folder.
 pub(crate) struct Judge {
     scan: Option<PathBuf>,
     lpips: Option<Lpips>,
 }
 
-/// For one vehicle.
+/// References for one vehicle.
 #[derive(Default)]
-pub(crate) struct OfVehicle<'a> {
-    /// Points all round the vehicle, its frame, metres.
+pub(crate) struct References<'a> {
+    /// Points all around the vehicle, in its frame, metres.
     pub(crate) scan: Option<Cloud>,
     pub(crate) lpips: Option<&'a Lpips>,
 }
@@ -29,13 +29,13 @@ impl Judge {
         Ok(Self { scan: args.scan.clone(), lpips: args.lpips.as_ref().map(open).transpose()? })
     }
 
-    /// The network that LPIPS is by, where it is measured.
+    /// Name of the LPIPS network, where LPIPS is measured.
     pub(crate) fn lpips_net(&self) -> Option<&str> {
         self.lpips.as_ref().map(Lpips::net)
     }
 
-    pub(crate) fn of(&self, scene: &Path) -> Result<OfVehicle<'_>> {
+    pub(crate) fn references(&self, scene: &Path) -> Result<References<'_>> {
         let scan = self.scan.as_ref().map(|file| cloud::read(&split::find(file, scene))).transpose()?;
-        Ok(OfVehicle { scan, lpips: self.lpips.as_ref() })
+        Ok(References { scan, lpips: self.lpips.as_ref() })
     }
 }

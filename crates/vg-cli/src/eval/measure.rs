@@ -3,7 +3,7 @@
 //! The photograph is composited on white with its mask, the render is drawn on white with its own alpha, and the
 //! full frames are compared. A distorted camera's photograph stays on its own grid; the renderer follows it there.
 
-use super::judge::OfVehicle;
+use super::judge::References;
 use super::split::Split;
 use super::sweep::sweep;
 use crate::job::Result;
@@ -19,7 +19,7 @@ use vg::render::{CpuRenderer, RenderOptions, Rendered, Renderer};
 use vg::scene::Cloud;
 use vg::{Error, Gaussians, View};
 
-/// The numbers of one split.
+/// Measurements of one split.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Measured {
     /// The depth source that was used.
@@ -33,19 +33,19 @@ pub(crate) struct Measured {
     pub(crate) surface: Option<SurfaceErrors>,
     /// PSNR in the input views, dB.
     pub(crate) input_psnr_db: Option<f64>,
-    /// SSIM there.
+    /// SSIM in the input views.
     pub(crate) input_ssim: Option<f64>,
-    /// Depth error in the input views, metres, where they have depth that the method was not shown.
+    /// Mean absolute depth error in the input views, metres, where they have depth that the method did not use.
     pub(crate) input_depth_mae_m: Option<f64>,
-    /// The 90th percentile there, metres, mean over the views.
+    /// 90th percentile of the depth error in the input views, metres, mean over the views.
     pub(crate) input_depth_p90_m: Option<f64>,
-    /// Median over the repeats, milliseconds; `None` of what was made elsewhere.
+    /// Reconstruction time, milliseconds; `None` for imports without a given time.
     pub(crate) reconstruct_ms: Option<f64>,
-    /// Median over the test views, milliseconds.
+    /// Render time of one picture, median over the test views, milliseconds.
     pub(crate) render_ms: f64,
-    /// In the model.
+    /// Number of Gaussians in the model.
     pub(crate) gaussians: f64,
-    /// The method's own verdict on its input and result, the worst of several; `None` of what was made elsewhere.
+    /// The method's own verdict on its input and result, the worst over several splits; `None` for imports.
     pub(crate) verdict: Option<Verdict>,
     /// Each test view.
     pub(crate) views: Vec<MeasuredView>,
@@ -54,29 +54,29 @@ pub(crate) struct Measured {
 /// One test view.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct MeasuredView {
-    /// The view.
+    /// Name of the view.
     pub(crate) name: String,
-    /// Its numbers.
+    /// Errors in the view.
     #[serde(flatten)]
     pub(crate) errors: ViewErrors,
     /// LPIPS, where a network for it was given.
     pub(crate) lpips: Option<f64>,
 }
 
-/// What there is to show to the method.
-pub(crate) struct Shown<'a> {
+/// Data of a vehicle from which a method's input is taken.
+pub(crate) struct MethodInput<'a> {
     /// File or folder of the scene.
     pub(crate) scene: &'a Path,
-    /// How it is opened.
+    /// Options with which it is opened.
     pub(crate) options: &'a SceneOptions,
-    /// Points measured on the vehicle, all round it.
+    /// Points measured all around the vehicle.
     pub(crate) cloud: Option<&'a Cloud>,
-    /// How many of them are shown, of those that the input cameras see; all of the cloud without.
+    /// Number of points to use, of those that the input cameras see; `None` means the whole cloud.
     pub(crate) cloud_points: Option<usize>,
 }
 
-impl<'a> Shown<'a> {
-    /// Without a cloud.
+impl<'a> MethodInput<'a> {
+    /// Input without a cloud.
     pub(crate) fn plain(scene: &'a Path, options: &'a SceneOptions) -> Self {
         Self { scene, options, cloud: None, cloud_points: None }
     }
@@ -84,10 +84,10 @@ impl<'a> Shown<'a> {
 
 /// Reconstructs and measures once.
 pub(crate) fn split(
-    from: &Shown,
+    from: &MethodInput,
     split: &Split,
     method: &Options,
-    judge: &OfVehicle,
+    judge: &References,
     threads: &Threads,
 ) -> Result<Measured> {
     let shown = inputs(from, split, method, threads)?;
@@ -103,15 +103,15 @@ pub(crate) fn split(
     Ok(measured)
 }
 
-/// Measures a model in a split's views, wherever it came from.
+/// Measures a model of any origin in a split's views.
 pub(crate) fn model(
-    from: &Shown,
+    from: &MethodInput,
     split: &Split,
     made: &Gaussians,
-    by: &OfVehicle,
+    by: &References,
     threads: &Threads,
 ) -> Result<Measured> {
-    // Depth is for the measure only; a method has done its work without, unless it was to see it.
+    // This depth is for the measurement only; the model is already made.
     let with_depth = SceneOptions { load_depth: true, ..from.options.clone() };
     let judged = scene::open(from.scene, &split.test, &with_depth, threads)?;
     let (drawn_tests, mut measured) = judge(made, &judged.scene.views, threads)?;
@@ -135,14 +135,14 @@ pub(crate) fn model(
     Ok(measured)
 }
 
-/// Milliseconds of one more reconstruction of the same.
-pub(crate) fn time(from: &Shown, split: &Split, method: &Options, threads: &Threads) -> Result<f64> {
+/// Repeats the reconstruction and returns its milliseconds.
+pub(crate) fn time(from: &MethodInput, split: &Split, method: &Options, threads: &Threads) -> Result<f64> {
     let shown = inputs(from, split, method, threads)?;
     Ok(reconstruct::reconstruct(&shown, method, threads)?.report.total_ms)
 }
 
-/// The views the method sees, with depth only where it is to use it.
-fn inputs(from: &Shown, split: &Split, method: &Options, threads: &Threads) -> Result<vg::Scene> {
+/// The method's input views, with depth only where the method uses it.
+fn inputs(from: &MethodInput, split: &Split, method: &Options, threads: &Threads) -> Result<vg::Scene> {
     let load_depth =
         matches!(method.prior, PriorChoice::Auto | PriorChoice::Given) && method.baseline.is_none();
     let options = SceneOptions { load_depth, ..from.options.clone() };
@@ -157,7 +157,7 @@ fn inputs(from: &Shown, split: &Split, method: &Options, threads: &Threads) -> R
     Ok(shown)
 }
 
-/// The model drawn into these views, and how far that is from their photographs.
+/// Renders the model into these views and measures the errors against their photographs.
 pub(crate) fn judge(
     made: &Gaussians,
     views: &[View],
@@ -165,7 +165,7 @@ pub(crate) fn judge(
 ) -> Result<(Vec<Rendered>, Measured)> {
     let (drawn, render_ms) = drawn(made, views, threads)?;
     let each = errors_of(&drawn, views, threads);
-    let none = || Error::argument("test", "no view", "at least one");
+    let none = || Error::argument("test", "no view", "at least one view");
     let measured = Measured {
         prior: String::new(),
         lpips: None,
@@ -192,10 +192,10 @@ fn errors_of(drawn: &[Rendered], views: &[View], threads: &Threads) -> Vec<ViewE
     threads.run(|| drawn.iter().zip(views).map(|(d, v)| ViewErrors::of(d, v)).collect())
 }
 
-/// The model as these views' cameras see it, on white, and the median time of one picture, milliseconds.
+/// Renders of the model on white from these views' cameras, and the median time of one picture, milliseconds.
 fn drawn(gaussians: &Gaussians, views: &[View], threads: &Threads) -> Result<(Vec<Rendered>, f64)> {
     let (renderer, options) = (CpuRenderer::new(), RenderOptions::default());
-    // The first picture also pays for memory that later ones reuse.
+    // The first picture also allocates the memory that later ones reuse: it is not timed.
     if let Some(first) = views.first() {
         threads.run(|| renderer.render(gaussians, &first.camera, &options))?;
     }
@@ -209,7 +209,7 @@ fn drawn(gaussians: &Gaussians, views: &[View], threads: &Threads) -> Result<(Ve
     Ok((pictures, median(&mut times)))
 }
 
-/// Of an even number of values the mean of the middle two; of none 0.
+/// Median: the mean of the middle two for an even number of values, 0 for no values.
 pub(crate) fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     match values.len() {
@@ -218,7 +218,7 @@ pub(crate) fn median(values: &mut [f64]) -> f64 {
     }
 }
 
-/// Means over several splits; `None` of nothing.
+/// Means over several splits; `None` for no splits.
 pub(crate) fn mean(all: &[&Measured]) -> Option<Measured> {
     let errors: Vec<ViewErrors> = all.iter().map(|m| m.errors).collect();
     let errors = ViewErrors::mean(&errors)?;
@@ -241,13 +241,13 @@ pub(crate) fn mean(all: &[&Measured]) -> Option<Measured> {
     })
 }
 
-/// `None` of nothing.
+/// Mean of the values; `None` for no values.
 fn mean_of(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (sum, n) = values.fold((0.0, 0.0), |(sum, n), value| (sum + value, n + 1.0));
     (n > 0.0).then(|| sum / n)
 }
 
-/// Of the errors of size, the means of their absolute values.
+/// Means of the surface errors; for the size errors, means of their absolute values.
 fn mean_surface(all: &[SurfaceErrors]) -> Option<SurfaceErrors> {
     let of = |get: fn(&SurfaceErrors) -> f64| mean_of(all.iter().map(get));
     Some(SurfaceErrors {

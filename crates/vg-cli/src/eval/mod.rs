@@ -1,4 +1,4 @@
-//! `vg eval`: error and time of reconstructions from the inputs of splits, measured in their test views.
+//! `vg eval`: error and time of reconstructions from the input views of splits, measured in their test views.
 
 pub(crate) mod contest;
 mod import;
@@ -19,11 +19,11 @@ use contest::{Aligned, Broken, Contest, Row};
 use measure::Measured;
 use serde::Serialize;
 use std::path::PathBuf;
-use system::{Maker, Method, System, Takes};
+use system::{Maker, Method, SplitFilter, System};
 use vg::onnx::Model;
 use vg::pipeline::Options;
 
-/// What `--json` writes of one system.
+/// JSON document of one system.
 #[derive(Serialize)]
 struct Document<'a> {
     version: &'static str,
@@ -35,7 +35,7 @@ struct Document<'a> {
     errors: &'a [Broken],
 }
 
-/// What it writes of several.
+/// JSON document of several systems.
 #[derive(Serialize)]
 struct Comparison<'a> {
     version: &'static str,
@@ -48,24 +48,24 @@ struct Comparison<'a> {
     errors: &'a [Broken],
 }
 
-/// Every scene that can be evaluated is; the others are errors, and the exit code says that there were some.
+/// Evaluates every scene that can be evaluated; the others are reported as errors and make the exit code 1.
 pub(crate) fn run(args: &EvalArgs) -> Result {
     if args.table.is_none() && args.systems.is_empty() && args.imports.is_empty() {
-        return one(args);
+        return run_single(args);
     }
     if !args.method.is_silent() || args.depth.depth_scale.is_some() || args.cloud_points.is_some() {
-        let message = "options of the method beside --table, --system or --import; expected them in --with \"...\", \
-                       for all rows, or in a --system";
+        let message = "reconstruction options cannot stand next to --table, --system or --import; put them into \
+                       --with \"...\" for all rows, or into one --system";
         return Err(Failure { message: message.into(), code: USAGE });
     }
-    several(args)
+    run_comparison(args)
 }
 
 fn results(args: &EvalArgs) -> Results {
     Results::new([(Kind::Json, args.json.as_ref()), (Kind::Markdown, args.markdown.as_ref())])
 }
 
-/// What a measurement reads: scenes, what goes with each of them, and models.
+/// Files that a measurement reads: scenes, the files that belong to them, and models.
 pub(crate) fn inputs(vehicles: &VehiclesArgs, judge: &JudgeArgs, systems: &[System]) -> Result<Inputs> {
     let mut inputs = Inputs::default().files(&judge.lpips);
     let methods = || {
@@ -91,10 +91,10 @@ pub(crate) fn inputs(vehicles: &VehiclesArgs, judge: &JudgeArgs, systems: &[Syst
     Ok(inputs)
 }
 
-/// A table of one system, a row for each split.
-fn one(args: &EvalArgs) -> Result {
+/// Makes a table of one system with a row for each split.
+fn run_single(args: &EvalArgs) -> Result {
     if !args.with.is_empty() {
-        let message = "--with without --table, --system or --import; expected its options as they are";
+        let message = "--with needs --table, --system or --import; without them, give its options directly";
         return Err(Failure { message: message.into(), code: USAGE });
     }
     let method = Method {
@@ -105,11 +105,14 @@ fn one(args: &EvalArgs) -> Result {
         words: None,
     };
     let settings = method.settings.clone();
-    let system =
-        System { name: "this".into(), maker: Maker::Method(Box::new(method)), takes: Takes::default() };
+    let system = System {
+        name: "this".into(),
+        maker: Maker::Method(Box::new(method)),
+        splits: SplitFilter::default(),
+    };
     let results = results(args);
     results.prepare(&inputs(&args.vehicles, &args.judge, std::slice::from_ref(&system))?)?;
-    let contest = contest::hold(
+    let contest = contest::run(
         &args.vehicles,
         &args.judge,
         &args.method.model_options(),
@@ -119,7 +122,7 @@ fn one(args: &EvalArgs) -> Result {
     let row = &contest.rows[0];
     let each = row.each.iter().map(contest::InSplit::parts);
     let mean = row.mean.as_ref().filter(|_| row.each.len() > 1).map(|mean| ("mean", "", mean));
-    let grid = table::of_splits(each.chain(mean));
+    let grid = table::by_split(each.chain(mean));
     if let Some(path) = &args.markdown {
         files::write(path, |out| out.write_all(grid.markdown().as_bytes()))?;
     }
@@ -139,15 +142,15 @@ fn one(args: &EvalArgs) -> Result {
     Ok(results.outcome(Outcome { text: grid.text(), complete }))
 }
 
-/// A table of several, a row for each.
-fn several(args: &EvalArgs) -> Result {
+/// Makes a table with a row for each system.
+fn run_comparison(args: &EvalArgs) -> Result {
     let systems = tables::systems(args)?;
     let results = results(args);
     results.prepare(&inputs(&args.vehicles, &args.judge, &systems)?)?;
     let model_options = args.method.model_options();
-    let contest = contest::hold(&args.vehicles, &args.judge, &model_options, &systems, args.repeat)?;
+    let contest = contest::run(&args.vehicles, &args.judge, &model_options, &systems, args.repeat)?;
     let Contest { rows, errors, aligned, lpips_net } = &contest;
-    let grid = table::of_systems(rows, args.table == Some(TableName::Omissions));
+    let grid = table::by_system(rows, args.table == Some(TableName::Omissions));
     let missing = table::missing(rows);
     if let Some(path) = &args.markdown {
         let lines: String = missing.lines().map(|line| format!("- {line}\n")).collect();

@@ -1,7 +1,7 @@
-//! What a sensor beside the cameras would have measured of a scan: a few points of the side that they see.
+//! Simulates a sensor next to the cameras: a few points of a scan, on the side that the cameras see.
 //!
-//! A scan goes all round the vehicle; shown whole, it would give away the side that is to be guessed. Hidden
-//! points are told by the cloud alone, so that no ground truth takes part.
+//! A scan covers the whole vehicle, including the side that a method has to infer. Hidden points are found from the
+//! cloud alone, without ground truth.
 
 use glam::DVec3;
 use vg::View;
@@ -14,8 +14,8 @@ const CELLS: f64 = 64.0;
 /// within a cell, less than a vehicle is thick.
 const BEHIND_M: f64 = 0.2;
 
-/// At most `count` of the points on the cameras' side of y = 0 that one of them sees; always the same, and those of
-/// a smaller count are among those of a larger one.
+/// At most `count` of the points on the cameras' side of y = 0 that a camera sees. Deterministic; the points of a
+/// smaller count are a subset of those of a larger count.
 pub(super) fn sweep(points: &[[f32; 3]], views: &[View], count: usize) -> Vec<[f32; 3]> {
     let side: f64 = views.iter().map(|view| view.camera.center().y).sum();
     let mut seen = vec![false; points.len()];
@@ -29,7 +29,7 @@ pub(super) fn sweep(points: &[[f32; 3]], views: &[View], count: usize) -> Vec<[f
     chosen.into_iter().map(|i| points[i]).collect()
 }
 
-/// Marks the points in front of all others of their cell.
+/// Marks the points that are not hidden by a nearer point of their cell.
 fn see(points: &[[f32; 3]], view: &View, seen: &mut [bool]) {
     let camera = &view.camera;
     let camera_from_vehicle = camera.vehicle_from_camera.inverse();
@@ -51,7 +51,7 @@ fn see(points: &[[f32; 3]], view: &View, seen: &mut [bool]) {
     }
 }
 
-/// SplitMix64's finaliser: a random-looking order that is the same everywhere.
+/// SplitMix64's finaliser: a pseudo-random order that is the same on every platform.
 fn scrambled(i: u64) -> u64 {
     let mut z = i.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

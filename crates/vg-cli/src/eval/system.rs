@@ -1,4 +1,4 @@
-//! What is compared: systems, each a row of a table or a point of a sweep.
+//! Systems that are compared, each a row of a table or a point of a sweep.
 
 use super::import::Import;
 use super::split;
@@ -10,52 +10,52 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use vg::pipeline::Options;
 
-/// A row: what makes the models, and in which splits.
+/// A system: the maker of its models, and the splits in which it is measured.
 pub(crate) struct System {
     pub(crate) name: String,
     pub(crate) maker: Maker,
-    pub(crate) takes: Takes,
+    pub(crate) splits: SplitFilter,
 }
 
-/// Where models come from.
+/// Origin of a system's models.
 pub(crate) enum Maker {
     /// This library.
     Method(Box<Method>),
-    /// Another program, which ran before.
+    /// Another program, which was run before.
     Import(Import),
-    /// Nowhere: why.
+    /// No origin, with the reason.
     Missing(String),
 }
 
-/// Settings of a reconstruction, and what it is shown.
+/// Settings and input of a reconstruction.
 pub(crate) struct Method {
     pub(crate) settings: Options,
-    /// Metres per number in the depth files, instead of what the scene says.
+    /// Metres per unit of the depth files; overrides the scene's value.
     pub(crate) depth_scale: Option<f64>,
-    /// Points measured on the vehicle, and how many are shown of those that the input cameras see.
+    /// Points measured on the vehicle, and the number to use of those that the input cameras see.
     pub(crate) cloud: Option<PathBuf>,
     pub(crate) cloud_points: Option<usize>,
-    /// What was said, for another process; `None` where it was not said in words of its own.
+    /// Command-line words of the settings, for a child process; `None` where there are no separate words.
     pub(crate) words: Option<Vec<OsString>>,
 }
 
-/// The splits a system is measured in.
+/// Splits and test views in which a system is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Takes {
-    /// Those whose input cameras stand on this side.
+pub(crate) struct SplitFilter {
+    /// Only splits whose input cameras are on this side.
     pub(crate) side: Option<Side>,
-    /// Measured in the test views of all of the vehicle's splits but what is shown, not in the split's own alone.
+    /// Whether to measure in the test views of all splits of the vehicle, without this split's input views.
     pub(crate) all_tests: bool,
 }
 
-/// Of the vehicle.
+/// Side of the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Side {
     Left,
     Right,
 }
 
-/// Options of one system, as `vg eval` has them.
+/// Options of one system, a subset of those of `vg eval`.
 #[derive(Parser)]
 #[command(no_binary_name = true, disable_help_flag = true)]
 struct SystemArgs {
@@ -68,7 +68,7 @@ struct SystemArgs {
 }
 
 impl System {
-    /// Of `[NAME:] OPTIONS`, the value of `argument`, after the options that all have. Words are separated by white
+    /// Parses `[NAME:] OPTIONS`, the value of `argument`, appended to the common options. Words are separated by white
     /// space.
     pub(crate) fn read(argument: &str, text: &str, common: &str) -> Result<Self> {
         let (name, options) = match text.split_once(':') {
@@ -76,15 +76,15 @@ impl System {
             _ => (text.trim(), text.trim()),
         };
         let words = common.split_whitespace().chain(options.split_whitespace());
-        let method = Method::of(words.map(Into::into), &format!("{argument} \"{text}\""))?;
+        let method = Method::parse(words.map(Into::into), &format!("{argument} \"{text}\""))?;
         let name = if name.is_empty() { "default" } else { name }.to_owned();
-        Ok(Self { name, maker: Maker::Method(Box::new(method)), takes: Takes::default() })
+        Ok(Self { name, maker: Maker::Method(Box::new(method)), splits: SplitFilter::default() })
     }
 
     /// The files that another program made of a scene, one for each split.
     pub(crate) fn imported(&self, vehicles: &VehiclesArgs, scene: &Path) -> Vec<PathBuf> {
         let Maker::Import(import) = &self.maker else { return Vec::new() };
-        // What is wrong with the split is told where it is measured.
+        // Errors of the split are reported where it is measured.
         let splits = split::read(&split::find(&vehicles.split, scene), vehicles.only.as_deref());
         let keys = splits.into_iter().flatten().map(|(key, _)| key);
         keys.flat_map(|key| import.files(&scene::name(scene), &key)).collect()
@@ -92,17 +92,17 @@ impl System {
 }
 
 impl Method {
-    /// Of words of the command line; `said_in` is where they stand, for messages.
-    pub(crate) fn of(words: impl IntoIterator<Item = OsString>, said_in: &str) -> Result<Self> {
+    /// Parses words of the command line; `context` says in messages where they come from.
+    pub(crate) fn parse(words: impl IntoIterator<Item = OsString>, context: &str) -> Result<Self> {
         let words = last_of_each(words);
         let args = SystemArgs::try_parse_from(&words).map_err(|e| {
-            let message = format!("{said_in}: {}", crate::one_line(&e.render().to_string()));
+            let message = format!("{context}: {}", crate::one_line(&e.render().to_string()));
             Failure { message, code: USAGE }
         })?;
         let settings = args
             .method
             .options()
-            .map_err(|failure| Failure { message: format!("{said_in}: {}", failure.message), ..failure })?;
+            .map_err(|failure| Failure { message: format!("{context}: {}", failure.message), ..failure })?;
         Ok(Self {
             settings,
             depth_scale: args.depth.depth_scale,
@@ -113,7 +113,7 @@ impl Method {
     }
 }
 
-/// Each option once, as it was said last: a row's own stands for what all rows have.
+/// Keeps the last occurrence of each option: a row's own options override the common ones.
 fn last_of_each(words: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
     let mut options: Vec<(OsString, Vec<OsString>)> = Vec::new();
     for word in words {
@@ -136,9 +136,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_said_last_stands() {
-        let said = "--prior hull --no-photo --threads=1 --prior shape --threads 2 --no-photo";
-        let words = last_of_each(said.split(' ').map(Into::into));
+    fn the_last_occurrence_of_an_option_is_kept() {
+        let given = "--prior hull --no-photo --threads=1 --prior shape --threads 2 --no-photo";
+        let words = last_of_each(given.split(' ').map(Into::into));
         assert_eq!(words, ["--prior", "shape", "--threads", "2", "--no-photo"].map(OsString::from));
         assert_eq!(last_of_each(["stray".into()]), [OsString::from("stray")]);
     }

@@ -1,4 +1,4 @@
-//! The numbers as tables for people.
+//! Measurements as tables.
 
 use super::contest::Row;
 use super::measure::Measured;
@@ -6,8 +6,8 @@ use crate::grid::{Column, Grid, number};
 use crate::shown;
 use Column::{Numbers, Rare, Words};
 
-/// A row for each split, and their mean.
-pub(crate) fn of_splits<'a>(rows: impl IntoIterator<Item = (&'a str, &'a str, &'a Measured)>) -> Grid {
+/// A table with a row for each split and a row for the mean.
+pub(crate) fn by_split<'a>(rows: impl IntoIterator<Item = (&'a str, &'a str, &'a Measured)>) -> Grid {
     let mut grid = Grid::new(&[
         Words("scene"),
         Words("split"),
@@ -58,8 +58,8 @@ pub(crate) fn of_splits<'a>(rows: impl IntoIterator<Item = (&'a str, &'a str, &'
     grid
 }
 
-/// A row for each system. With `beside`, what a row gains over the first: dB, seconds, MiB.
-pub(crate) fn of_systems(rows: &[Row], beside: bool) -> Grid {
+/// A table with a row for each system. With `beside`, also the differences to the first row: dB, seconds, MiB.
+pub(crate) fn by_system(rows: &[Row], beside: bool) -> Grid {
     let mut grid = Grid::new(&[
         Words("system"),
         Numbers("splits"),
@@ -134,7 +134,7 @@ fn surface(m: &Measured) -> [String; 5] {
     ]
 }
 
-/// Why rows have no numbers, a line each.
+/// Reasons why rows have no numbers, one line each.
 pub(crate) fn missing(rows: &[Row]) -> String {
     let lines = rows
         .iter()

@@ -1,13 +1,13 @@
-//! The tables that can be asked for by name: the paper's five, and what leaving things out costs.
+//! Predefined tables: the paper's five, and the cost of the plan's omissions.
 
 use super::import::{Import, Kind};
-use super::system::{Maker, Method, Side, System, Takes};
+use super::system::{Maker, Method, Side, SplitFilter, System};
 use crate::args::{EvalArgs, TableName};
 use crate::job::Result;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-/// What a row still needs where a network would make it.
+/// Reasons why a row that needs networks is missing.
 const NO_PRIOR_MODEL: &str = "needs a geometry network: --prior-model M.onnx";
 const NO_HEAD_MODEL: &str = "needs a Gaussian head: --head-model M.onnx";
 
@@ -32,7 +32,7 @@ pub(super) fn systems(args: &EvalArgs) -> Result<Vec<System>> {
 }
 
 fn imported((name, import): (String, Import)) -> System {
-    System { name, maker: Maker::Import(import), takes: Takes::default() }
+    System { name, maker: Maker::Import(import), splits: SplitFilter::default() }
 }
 
 struct Preset<'a> {
@@ -46,7 +46,7 @@ impl Preset<'_> {
             .position(|(_, import)| import.kind() == kind)
         {
             Some(i) => imported(imports.remove(i)),
-            None => missing(name, &format!("runs elsewhere: --import \"{name}: {word} PATH\"")),
+            None => missing(name, &format!("made by another program: give --import \"{name}: {word} PATH\"")),
         };
         let (da3, trellis) =
             (made_by(Kind::DepthAnything3, "DA3", "da3"), made_by(Kind::Trellis, "TRELLIS", "trellis"));
@@ -69,7 +69,7 @@ impl Preset<'_> {
 
     fn side(&self) -> Result<Vec<System>> {
         let row = |name: &str, side: Side, all_tests: bool| -> Result<System> {
-            Ok(System { takes: Takes { side: Some(side), all_tests }, ..self.row(name, "")? })
+            Ok(System { splits: SplitFilter { side: Some(side), all_tests }, ..self.row(name, "")? })
         };
         Ok(vec![
             row("left in, right out", Side::Left, false)?,
@@ -97,7 +97,7 @@ impl Preset<'_> {
         ])
     }
 
-    /// The head's file is `{activation}`'s.
+    /// Table 5; the name of the head's file contains `{activation}`.
     fn activation(&self) -> Result<Vec<System>> {
         let row = |activation: &str| {
             let Some(pattern) = &self.args.method.head_model else {
@@ -135,12 +135,12 @@ impl Preset<'_> {
         ])
     }
 
-    /// A row of this library's own, after the options that all have.
+    /// A row of this library, with the common options before its own.
     fn row(&self, name: &str, options: &str) -> Result<System> {
         self.with_models(name, None, None, options)
     }
 
-    /// One that needs networks: missing where they are.
+    /// A row that needs networks; it is missing where they are.
     fn networks(&self, name: &str, prior: bool, head: bool, options: &str) -> Result<System> {
         let of = |wanted: bool, path: &'_ Option<PathBuf>| path.clone().filter(|_| wanted);
         let (prior_model, head_model) =
@@ -169,14 +169,18 @@ impl Preset<'_> {
         if let Some(path) = head {
             words.extend(["--head-model".into(), path.into()]);
         }
-        let method = Method::of(words, &format!("row \"{name}\", --with \"{}\"", self.args.with))?;
-        Ok(System { name: name.into(), maker: Maker::Method(Box::new(method)), takes: Takes::default() })
+        let method = Method::parse(words, &format!("row \"{name}\", --with \"{}\"", self.args.with))?;
+        Ok(System {
+            name: name.into(),
+            maker: Maker::Method(Box::new(method)),
+            splits: SplitFilter::default(),
+        })
     }
 }
 
-/// To the letter: the denser side is cloned whole, in the light it was seen in, and cameras are taken as they are.
+/// Options that follow the paper exactly: clone the whole denser side, do not relight, use the cameras as given.
 const PAPER: &str = "--symmetry always --relight never --calibrate off";
 
 fn missing(name: &str, why: &str) -> System {
-    System { name: name.into(), maker: Maker::Missing(why.into()), takes: Takes::default() }
+    System { name: name.into(), maker: Maker::Missing(why.into()), splits: SplitFilter::default() }
 }

@@ -1,4 +1,4 @@
-//! The vehicles of a measurement: their folders, splits, and whose frame their poses are in.
+//! Vehicles of a measurement: their folders, their splits, and the frame of their poses.
 
 use super::split::{self, Split};
 use crate::args::VehiclesArgs;
@@ -11,8 +11,8 @@ use vg::geometry::Similarity;
 use vg::io::{FitQuality, SceneFormat, SceneOptions};
 use vg::progress::Threads;
 
-/// What a scene's folder has one of.
-const OF_A_SCENE: [&str; 8] = [
+/// Files and folders of which every scene's folder has at least one.
+const SCENE_ENTRIES: [&str; 8] = [
     "transforms.json",
     "images",
     "sparse",
@@ -29,7 +29,7 @@ pub(crate) struct Vehicle {
     /// File or folder of the scene.
     pub(crate) scene: PathBuf,
     pub(crate) splits: BTreeMap<String, Split>,
-    /// From the world of the scene's poses; `None` where that is the vehicle's frame already.
+    /// From the world of the scene's poses; `None` where that already is the vehicle's frame.
     pub(crate) vehicle_from_world: Option<Similarity>,
     /// How well the scene fits the scan that it was aligned to.
     pub(crate) fit: Option<FitQuality>,
@@ -37,7 +37,7 @@ pub(crate) struct Vehicle {
 }
 
 impl Vehicle {
-    /// Reads what a measurement needs to know before any picture.
+    /// Reads the data that a measurement needs before any picture.
     pub(crate) fn open(scene: &Path, args: &VehiclesArgs, threads: &Threads) -> Result<Self> {
         let splits = split::read(&split::find(&args.split, scene), args.only.as_deref())?;
         let mut vehicle = Self {
@@ -52,7 +52,7 @@ impl Vehicle {
             vehicle.vehicle_from_world = Some(vg::io::read_vehicle_from_world(&split::find(path, scene))?);
         } else if let Some(named) = &args.align {
             let named = named.as_ref().map(|path| split::find(path, scene));
-            let found = align::to_scan_of(scene, named.as_deref(), Heading::Auto, threads)?;
+            let found = align::align_to_scan(scene, named.as_deref(), Heading::Auto, threads)?;
             vehicle.vehicle_from_world = Some(found.vehicle_from_world);
             vehicle.fit = Some(FitQuality { residual_m: found.residual_m, confidence: found.confidence });
             vehicle.format = vg::io::colmap_format(scene);
@@ -60,7 +60,7 @@ impl Vehicle {
         Ok(vehicle)
     }
 
-    /// How its scene is opened; without depth.
+    /// Options with which its scene is opened, without depth.
     pub(crate) fn options(&self, depth_scale: Option<f64>) -> SceneOptions {
         SceneOptions {
             vehicle_from_world: self.vehicle_from_world,
@@ -76,7 +76,7 @@ impl Vehicle {
         Ok(vg::io::list_scene(&self.scene, &self.options(None))?.source)
     }
 
-    /// Mean y of the cameras of these views, vehicle frame, metres: above 0 on the vehicle's left.
+    /// Mean y of the cameras of these views, vehicle frame, metres; positive on the vehicle's left.
     pub(crate) fn side(&self, views: &[String]) -> Result<f64> {
         let options = SceneOptions { views: Some(views.to_vec()), ..self.options(None) };
         let index = vg::io::list_scene(&self.scene, &options)?;
@@ -85,7 +85,7 @@ impl Vehicle {
     }
 }
 
-/// The scenes that are meant: a folder of scenes stands for all in it, by name.
+/// Expands folders of scenes to the scenes in them, sorted by name.
 pub(crate) fn found(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for path in named {
@@ -97,9 +97,9 @@ pub(crate) fn found(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// `None` of what is a scene itself, or nothing.
+/// Scenes in the folder; `None` if it is a scene itself or contains none.
 fn scenes_in(folder: &Path) -> Result<Option<Vec<PathBuf>>> {
-    let is_scene = |path: &Path| OF_A_SCENE.iter().any(|name| path.join(name).exists());
+    let is_scene = |path: &Path| SCENE_ENTRIES.iter().any(|name| path.join(name).exists());
     if !folder.is_dir() || is_scene(folder) {
         return Ok(None);
     }

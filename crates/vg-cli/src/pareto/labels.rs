@@ -1,10 +1,10 @@
-//! Where the names of points stand, so that none lies on another.
+//! Places the names of points so that they do not overlap.
 
-/// Width of a letter of 13 pixels, on average, and height of a line.
+/// Mean width of a letter at a font size of 13 pixels, and height of a line.
 const LETTER: f64 = 6.9;
 const LINE: f64 = 14.0;
 
-/// From a point to its name.
+/// Distances that are tried between a point and its name.
 const GAPS: [f64; 3] = [7.0, 16.0, 28.0];
 
 /// Samples along each piece of the front.
@@ -65,7 +65,7 @@ fn holds(label: &Rectangle, [x, y]: [f64; 2], margin: f64) -> bool {
         && (label[1] - margin..=label[3] + margin).contains(&y)
 }
 
-/// The area that two share.
+/// Area of the intersection of two rectangles.
 fn both(a: &Rectangle, b: &Rectangle) -> f64 {
     let side = |k: usize| (a[k + 2].min(b[k + 2]) - a[k].max(b[k])).max(0.0);
     side(0) * side(1)

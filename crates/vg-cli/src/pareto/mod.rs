@@ -17,13 +17,13 @@ use vg::onnx::ModelOptions;
 /// A point of the sweep that was measured.
 #[derive(Serialize)]
 struct Point {
-    /// No other point is both faster and nearer.
+    /// Whether no other point is better in both time and PSNR.
     on_front: bool,
     #[serde(flatten)]
     row: Row,
 }
 
-/// What `--json` writes.
+/// JSON document.
 #[derive(Serialize)]
 struct Document<'a> {
     version: &'static str,
@@ -32,7 +32,7 @@ struct Document<'a> {
     points: &'a [Point],
 }
 
-/// A scene or a point that cannot be measured is an error, and the others go on without it.
+/// Measures all points; a scene or a point that cannot be measured is reported as an error and left out.
 pub(crate) fn run(args: &ParetoArgs) -> Result {
     let points = args.points.iter().map(|text| System::read("--point", text, &args.with));
     let systems: Vec<System> = points.collect::<Result<_>>()?;
@@ -43,8 +43,7 @@ pub(crate) fn run(args: &ParetoArgs) -> Result {
         (Kind::Json, args.json.as_ref()),
     ]);
     results.prepare(&eval::inputs(&args.vehicles, &args.judge, &systems)?)?;
-    let contest =
-        contest::hold(&args.vehicles, &args.judge, &ModelOptions::default(), &systems, args.repeat)?;
+    let contest = contest::run(&args.vehicles, &args.judge, &ModelOptions::default(), &systems, args.repeat)?;
     let complete = contest.is_complete(&systems);
     let Contest { rows, .. } = contest;
     let missing = table::missing(&rows);

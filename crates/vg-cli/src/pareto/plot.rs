@@ -1,4 +1,4 @@
-//! The sweep as a picture: error against run time, SVG.
+//! Plot of the sweep: error against run time, as SVG.
 
 use super::{Point, labels, place};
 use crate::shown;
@@ -11,13 +11,13 @@ const GREY: &str = "#6b7280";
 const FRONT: &str = "#1d4ed8";
 const BEHIND: &str = "#b45309";
 
-/// An axis: values to places on the picture.
+/// An axis: maps values to coordinates of the picture.
 struct Axis {
     low: f64,
     high: f64,
     from: f64,
     to: f64,
-    /// Its logarithm is drawn.
+    /// Whether the axis is logarithmic.
     is_log: bool,
 }
 
@@ -27,7 +27,7 @@ impl Axis {
         self.from + (of(value) - of(self.low)) / (of(self.high) - of(self.low)) * (self.to - self.from)
     }
 
-    /// 1, 2 and 5 of each decade, or steps of such a number.
+    /// Ticks at 1, 2 and 5 of each decade; on a linear axis, multiples of such a number.
     fn ticks(&self) -> Vec<f64> {
         if self.is_log {
             let decades = self.low.log10().floor() as i32..=self.high.log10().ceil() as i32;
@@ -43,7 +43,7 @@ impl Axis {
     }
 }
 
-/// A point with its place and its spread.
+/// A point of the plot with its spread.
 struct Mark<'a> {
     name: &'a str,
     seconds: f64,
@@ -54,8 +54,8 @@ struct Mark<'a> {
 }
 
 impl<'a> Mark<'a> {
-    /// `None` of a point that was not measured, or whose pictures have no error at all.
-    fn of(point: &'a Point) -> Option<Self> {
+    /// `None` for a point that was not measured, or whose PSNR is infinite.
+    fn from_point(point: &'a Point) -> Option<Self> {
         let row = &point.row;
         let [seconds, psnr] = place(row).filter(|place| place[1].is_finite())?;
         let error = row.psnr_standard_error_db.unwrap_or(0.0);
@@ -70,9 +70,9 @@ impl<'a> Mark<'a> {
     }
 }
 
-/// PSNR of the test views against seconds, both with their spread; the front is joined. `None` of no point.
+/// PSNR of the test views against seconds, both with their spread; a line joins the front. `None` without points.
 pub(super) fn svg(points: &[Point], title: &str) -> Option<String> {
-    let rows: Vec<Mark> = points.iter().filter_map(Mark::of).collect();
+    let rows: Vec<Mark> = points.iter().filter_map(Mark::from_point).collect();
     if rows.is_empty() {
         return None;
     }
@@ -165,7 +165,7 @@ fn grid(out: &mut String, x: &Axis, y: &Axis) {
     );
 }
 
-/// For XML; control characters are escaped.
+/// Escapes text for XML; control characters become escape sequences.
 fn escaped(text: &str) -> String {
     let one = |c: char| match c {
         '&' => "&amp;".into(),

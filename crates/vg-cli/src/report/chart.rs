@@ -1,21 +1,21 @@
-//! Where the time went: the stages as one bar, with a legend.
+//! Chart of the stage times: one bar with a legend.
 
 use super::text::{escaped, ms};
 use std::fmt::Write;
 use vg::pipeline::Stage;
 
-/// The bar's length in its own units.
+/// Length of the bar in its own units.
 const LENGTH: f64 = 1000.0;
 
 const HEIGHT: f64 = 36.0;
 
-/// Stages shorter than this are in the legend alone, units of the bar.
+/// Stages shorter than this appear only in the legend, units of the bar.
 const LEAST: f64 = 0.5;
 
-/// Stages that had nothing to do take less, milliseconds.
+/// Stages that take less had nothing to do, milliseconds.
 const IDLE_MS: f64 = 0.005;
 
-/// A stage has its colour on every page, whatever other stages there are; told apart on white and on black.
+/// Fixed colours of the stages, distinguishable on white and on black.
 const COLORS: [(&str, &str); 10] = [
     ("plan", "#7f8c9b"),
     ("undistort", "#c9a227"),
@@ -29,10 +29,10 @@ const COLORS: [(&str, &str); 10] = [
     ("check", "#b8a9c9"),
 ];
 
-/// Of stages this page does not know, and of what lies between stages.
+/// Colour of other stages and of the time between stages.
 const OTHER: &str = "#9aa0a6";
 
-/// Bar and legend.
+/// The bar and its legend.
 pub(super) fn stages(stages: &[Stage], total_ms: f64) -> String {
     let rest = total_ms - stages.iter().map(|s| s.ms).sum::<f64>();
     let all: Vec<(&str, f64)> = stages
@@ -79,7 +79,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lengths_are_shares_of_the_time_and_what_no_stage_took_is_told() {
+    fn lengths_are_shares_of_the_time_and_the_rest_is_shown_as_other() {
         let all = [
             Stage { name: "prior", ms: 60.0 },
             Stage { name: "plan", ms: 0.02 },
@@ -88,7 +88,7 @@ mod tests {
         let svg = stages(&all, 100.0);
         assert!(svg.contains("x=\"0.00\" y=\"0\" width=\"600.00\""), "{svg}");
         assert!(svg.contains("other <b>20.0 ms</b> <small>20 %"), "{svg}");
-        // Too short to be seen, but in the legend.
+        // `plan` is too short for the bar, but in the legend.
         assert_eq!((svg.matches("<rect").count(), svg.matches("<li>").count()), (3, 4));
         assert!(!stages(&[], 0.0).contains("NaN"));
     }

@@ -1,4 +1,4 @@
-//! The model beside the photographs, view by view.
+//! Compares the model with the photographs, view by view.
 
 use super::pictures::{self, Picture};
 use crate::job::Result;
@@ -9,17 +9,17 @@ use vg::progress::Threads;
 use vg::render::{CpuRenderer, RenderOptions, Renderer};
 use vg::{Gaussians, View};
 
-/// What views are to the method.
+/// Role of views for the method.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Role {
-    /// It was made from them.
+    /// Views the model was made from.
     Input,
-    /// It never saw them.
+    /// Views the method did not use.
     Test,
 }
 
 impl Role {
-    /// Most views that are shown as pictures; the others are in the table of numbers.
+    /// Largest number of views that are shown as pictures; the others appear only in the table of numbers.
     pub(super) fn most(self) -> usize {
         match self {
             Self::Input => 8,
@@ -28,11 +28,11 @@ impl Role {
     }
 }
 
-/// A view, and how far off the model is in it.
+/// A view and the model's errors in it.
 pub(super) struct Compared {
     pub(super) name: String,
     pub(super) errors: ViewErrors,
-    /// Of one picture.
+    /// Render time of one picture.
     pub(super) render_ms: f64,
     /// `None` where there are too many to show.
     pub(super) shown: Option<Shown>,
@@ -42,11 +42,11 @@ pub(super) struct Shown {
     /// The vehicle on white.
     pub(super) photograph: Picture,
     pub(super) render: Picture,
-    /// Of a test view.
+    /// Difference of the two; only for a test view.
     pub(super) error: Option<Picture>,
 }
 
-/// Draws the model on white into all of these views. Of each, numbers and small pictures are kept.
+/// Renders the model on white into all of these views and keeps the numbers and small pictures of each.
 pub(super) fn views(
     gaussians: &Gaussians,
     views: &[View],
@@ -54,7 +54,7 @@ pub(super) fn views(
     threads: &Threads,
 ) -> Result<Vec<Compared>> {
     let (renderer, options) = (CpuRenderer::new(), RenderOptions::default());
-    let bar = Bar::of_pictures(views.len());
+    let bar = Bar::for_pictures(views.len());
     let mut all = Vec::with_capacity(views.len());
     for (i, view) in views.iter().enumerate() {
         let start = Instant::now();
@@ -81,12 +81,12 @@ pub(super) fn views(
     Ok(all)
 }
 
-/// Whether view `i` of `n` is one of the `most` that are spread evenly over them, the first among them.
+/// Whether view `i` of `n` is one of the `most` that are spread evenly over them, including the first.
 fn is_shown(i: usize, n: usize, most: usize) -> bool {
     n <= most || (i * most).div_ceil(n) * n < (i + 1) * most
 }
 
-/// Means over views; `None` of nothing.
+/// Means over views; `None` for no views.
 pub(super) fn mean(all: &[Compared]) -> Option<ViewErrors> {
     ViewErrors::mean(&all.iter().map(|one| one.errors).collect::<Vec<_>>())
 }
@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn as_many_views_are_shown_as_may_be_and_the_first_is_one() {
+    fn as_many_views_are_shown_as_allowed_including_the_first() {
         for n in 1..200 {
             let shown: Vec<usize> = (0..n).filter(|&i| is_shown(i, n, 12)).collect();
             assert_eq!((shown.len(), shown[0]), (n.min(12), 0), "{n}");

@@ -1,5 +1,4 @@
-//! `vg report`: one run on one page that needs nothing else: what went in, what came out, how far off it is, how long
-//! it took, and what was left out.
+//! `vg report`: one run on one self-contained page: inputs, result, errors, times, and what was left out.
 
 mod chart;
 mod compare;
@@ -19,12 +18,12 @@ use std::path::{Path, PathBuf};
 use vg::io::{SceneOptions, list_scene};
 use vg::progress::Threads;
 
-/// Opens, reconstructs, draws, writes.
+/// Opens the scene, reconstructs, renders, and writes the page.
 pub(crate) fn run(args: &ReportArgs) -> Result {
-    let chosen = Chosen::of(args)?;
+    let chosen = Chosen::from_args(args)?;
     let options = scene::options(&args.frame, args.depth.depth_scale, args.method.wants_depth())?;
     let inputs = list_scene(&args.scene, &scene::named(chosen.inputs.as_deref(), &options))?;
-    // Depth of the test views is for the measure only.
+    // Depth of the test views is used only for the measurement.
     let with_depth = SceneOptions { load_depth: true, ..options };
     let tests = match chosen.tests.as_slice() {
         [] => None,
@@ -34,7 +33,7 @@ pub(crate) fn run(args: &ReportArgs) -> Result {
     let method = &args.method;
     let results = Results::new([(Kind::Html, Some(&args.output))]);
     let listed: Vec<PathBuf> =
-        [Some(&inputs), tests.as_ref()].into_iter().flatten().flat_map(scene::files_of).collect();
+        [Some(&inputs), tests.as_ref()].into_iter().flatten().flat_map(scene::view_files).collect();
     let read = Inputs::default().files(&listed).files(method.files()).files(&cloud_file).files(&chosen.file);
     results.prepare(&read.files(&args.frame.vehicle_from_world).scene(&args.scene))?;
 
@@ -69,21 +68,21 @@ pub(crate) fn run(args: &ReportArgs) -> Result {
     Ok(results.outcome(Outcome::done(summary(&args.output, page.len(), &inputs, &tests))))
 }
 
-/// Which views the method sees, and in which it is judged.
+/// Choice of input and test views.
 struct Chosen {
-    /// All if not given.
+    /// Input views; all if `None`.
     inputs: Option<Vec<String>>,
     tests: Vec<String>,
-    /// In words.
+    /// Description of the choice.
     how: String,
-    /// The split's file.
+    /// File of the split.
     file: Option<PathBuf>,
 }
 
 impl Chosen {
-    fn of(args: &ReportArgs) -> Result<Self> {
+    fn from_args(args: &ReportArgs) -> Result<Self> {
         let alone = |inputs: Option<Vec<String>>, why: &str| {
-            let how = format!("{why}: the model is compared only with the photographs it was made from.");
+            let how = format!("{why}, so the model is compared only with the photographs it was made from.");
             Ok(Self { inputs, tests: Vec::new(), how, file: None })
         };
         if let Some(names) = args.views.names() {
@@ -94,10 +93,10 @@ impl Chosen {
         match (&args.split, &args.only) {
             (None, Some(only)) if !file.is_file() => {
                 let message =
-                    format!("--only {only}: no split.json here or in the scene's folder, and no --split");
+                    format!("--only {only}: no split.json here or in the scene's folder; give --split FILE");
                 return Err(Failure::job(message));
             }
-            (None, None) if !file.is_file() => return alone(None, "There is no split"),
+            (None, None) if !file.is_file() => return alone(None, "There is no split of the views"),
             _ => {}
         }
         let splits = split::read(&file, args.only.as_deref())?;
@@ -108,22 +107,22 @@ impl Chosen {
             _ => format!(", the first of {keys} (--only chooses another)"),
         };
         let how = format!(
-            "Split {key} of {}{first}: {} views are the method's input, {} others are what it is judged by.",
+            "Split {key} of {}{first}: {}, and {} that the method did not use.",
             file.display(),
-            split.input.len(),
-            split.test.len()
+            shown::counted(split.input.len(), "input view"),
+            shown::counted(split.test.len(), "test view")
         );
         Ok(Self { inputs: Some(split.input), tests: split.test, how, file: Some(file) })
     }
 }
 
-/// One line.
+/// Summary of the run on one line.
 fn summary(output: &Path, bytes: usize, inputs: &[Compared], tests: &[Compared]) -> String {
-    let (judged, what) = if tests.is_empty() { (inputs, "input") } else { (tests, "test") };
+    let (judged, what) = if tests.is_empty() { (inputs, "input view") } else { (tests, "test view") };
     let errors = compare::mean(judged).map_or_else(String::new, |mean| {
         format!(
-            "; in {} {what} views PSNR {} dB, silhouette IoU {:.3}",
-            judged.len(),
+            "; in {} PSNR {} dB, silhouette IoU {:.3}",
+            shown::counted(judged.len(), what),
             text::psnr(mean.psnr_db),
             mean.silhouette_iou
         )

@@ -1,4 +1,4 @@
-//! The page itself: HTML with everything inside, and nothing that a browser would have to fetch.
+//! The page itself: self-contained HTML, with nothing for a browser to fetch.
 
 use super::chart;
 use super::compare::{self, Compared, Role};
@@ -11,20 +11,20 @@ use std::fmt::{self, Write};
 use vg::metrics::ViewErrors;
 use vg::pipeline::{CheckedView, InputError, Report};
 
-/// What the page is about.
+/// Contents of the page.
 pub(super) struct Run<'a> {
     pub(super) vehicle: String,
-    /// Which views are inputs and which are judged, in words.
+    /// Description of the input and test views.
     pub(super) chosen: &'a str,
     pub(super) inputs: &'a [Compared],
-    /// None where all views are inputs.
+    /// Test views; empty where all views are inputs.
     pub(super) tests: &'a [Compared],
     pub(super) turntable: Picture,
     pub(super) report: &'a Report,
-    /// From photographs to Gaussians.
+    /// Counts from photographs to Gaussians.
     pub(super) counts: &'a [(&'static str, usize)],
     pub(super) warnings: &'a [String],
-    /// That makes this page again.
+    /// Command that makes this page again.
     pub(super) command: String,
 }
 
@@ -38,7 +38,7 @@ pub(super) fn html(run: &Run) -> String {
 
 fn write(out: &mut String, run: &Run) -> fmt::Result {
     let vehicle = escaped(&run.vehicle);
-    // Browsers keep to the policy: a page that asked for anything would not get it.
+    // The policy makes browsers block every request of the page.
     write!(
         out,
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -46,7 +46,7 @@ fn write(out: &mut String, run: &Run) -> fmt::Result {
          <meta name=\"color-scheme\" content=\"light dark\">\n\
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; \
          style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\n\
-         <link rel=\"icon\" href=\"data:,\">\n<title>{vehicle}: a vehicle in Gaussians</title>\n\
+         <link rel=\"icon\" href=\"data:,\">\n<title>{vehicle}: reconstruction report</title>\n\
          <style>\n{}</style>\n</head>\n<body>\n",
         include_str!("style.css")
     )?;
@@ -60,7 +60,7 @@ fn write(out: &mut String, run: &Run) -> fmt::Result {
     let report = run.report;
     write!(
         out,
-        "<section id=\"time\">\n<h2>Where the time went</h2>\n{}\n</section>\n",
+        "<section id=\"time\">\n<h2>Time per stage</h2>\n{}\n</section>\n",
         chart::stages(&report.stages, report.total_ms)
     )?;
     counts(out, run)?;
@@ -69,27 +69,27 @@ fn write(out: &mut String, run: &Run) -> fmt::Result {
     write!(out, "</main>\n<script>\n{}</script>\n</body>\n</html>\n", include_str!("script.js"))
 }
 
-/// Name and main figures.
+/// The vehicle's name and the main figures.
 fn header(out: &mut String, run: &Run, vehicle: &str) -> fmt::Result {
     let report = run.report;
     write!(out, "<header>\n<h1>{vehicle}</h1>\n<p>{}</p>\n<dl class=\"headline\">\n", escaped(run.chosen))?;
     let mut figure = |name: &str, value: &str| writeln!(out, "<div><dt>{name}</dt><dd>{value}</dd></div>");
     let (judged, what) = match run.tests {
-        [] => (run.inputs, "input"),
-        tests => (tests, "unseen"),
+        [] => (run.inputs, "input view"),
+        tests => (tests, "unseen view"),
     };
     if let Some(mean) = compare::mean(judged) {
-        let views = format!("{} {what} view{}", judged.len(), if judged.len() == 1 { "" } else { "s" });
+        let views = shown::counted(judged.len(), what);
         figure(&format!("PSNR, {views}"), &format!("{} dB", psnr(mean.psnr_db)))?;
-        figure("SSIM there", &decimals(mean.ssim, 3))?;
-        figure("silhouette IoU there", &decimals(Some(mean.silhouette_iou), 3))?;
+        figure("SSIM", &decimals(mean.ssim, 3))?;
+        figure("silhouette IoU", &decimals(Some(mean.silhouette_iou), 3))?;
     }
     figure("verdict", verdict(report.verdict))?;
-    figure("reconstruction", &format!("{:.2} s", report.total_ms / 1e3))?;
+    figure("reconstruction time", &format!("{:.2} s", report.total_ms / 1e3))?;
     let mut times: Vec<f64> = judged.iter().map(|one| one.render_ms).collect();
     times.sort_by(f64::total_cmp);
     if let Some(median) = times.get(times.len() / 2) {
-        figure("one picture of it", &ms(*median))?;
+        figure("render time", &ms(*median))?;
     }
     figure("Gaussians", &shown::count(report.gaussians))?;
     if let Some(extent) = &report.extent_m {
@@ -110,8 +110,8 @@ fn header(out: &mut String, run: &Run, vehicle: &str) -> fmt::Result {
 fn inputs(out: &mut String, all: &[Compared]) -> fmt::Result {
     write!(
         out,
-        "<section id=\"inputs\">\n<h2>What went in</h2>\n\
-         <p>The photographs, masked and on white, each beside the model as its camera sees it.{}</p>\n\
+        "<section id=\"inputs\">\n<h2>Input views</h2>\n\
+         <p>Each photograph, masked, on white, next to a render of the model from its camera.{}</p>\n\
          <div class=\"pairs\">\n",
         selection(all, Role::Input)
     )?;
@@ -123,7 +123,7 @@ fn inputs(out: &mut String, all: &[Compared]) -> fmt::Result {
             caption(one)
         )?;
         image(out, &shown.photograph, "", &format!("Photograph {name} on white"))?;
-        image(out, &shown.render, "", &format!("The model as the camera of {name} sees it"))?;
+        image(out, &shown.render, "", &format!("Render from the camera of {name}"))?;
         out.push_str("</div>\n</figure>\n");
     }
     out.push_str("</div>\n");
@@ -136,7 +136,7 @@ fn tests(out: &mut String, all: &[Compared]) -> fmt::Result {
     write!(
         out,
         "<section id=\"tests\">\n<h2>The unseen side</h2>\n\
-         <p>Views the method was not shown: the photograph on white, the model drawn on white, and their \
+         <p>Views that the method did not use: the photograph on white, the model rendered on white, and their \
          difference.{}</p>\n",
         selection(all, Role::Test)
     )?;
@@ -149,7 +149,7 @@ fn tests(out: &mut String, all: &[Compared]) -> fmt::Result {
             caption(one)
         )?;
         image(out, &shown.photograph, "photograph", &format!("Photograph {name} on white"))?;
-        image(out, &shown.render, "model", &format!("The model as the camera of {name} sees it"))?;
+        image(out, &shown.render, "model", &format!("Render from the camera of {name}"))?;
         if let Some(error) = &shown.error {
             image(out, error, "difference", &format!("Difference of photograph and model in {name}"))?;
         }
@@ -160,13 +160,13 @@ fn tests(out: &mut String, all: &[Compared]) -> fmt::Result {
     Ok(())
 }
 
-/// What is said where not all views are shown.
+/// Sentence for a section that does not show all views.
 fn selection(all: &[Compared], role: Role) -> String {
     let (n, most) = (all.len(), role.most());
     if n <= most {
         return String::new();
     }
-    format!(" Of {n} views, {most} spread evenly are shown; the numbers below are of all.")
+    format!(" {most} of {n} views are shown, evenly spaced; the numbers below cover all views.")
 }
 
 fn shown(all: &[Compared]) -> impl Iterator<Item = (&Compared, &compare::Shown)> {
@@ -184,7 +184,7 @@ fn caption(one: &Compared) -> String {
     )
 }
 
-/// With its label below it, where it has one.
+/// A picture with its label below it, if any.
 fn image(out: &mut String, picture: &Picture, label: &str, alt: &str) -> fmt::Result {
     let Picture { data, width, height } = picture;
     write!(out, "<div><img src=\"{data}\" width=\"{width}\" height=\"{height}\" alt=\"{alt}\">")?;
@@ -203,13 +203,13 @@ fn legend(out: &mut String) -> fmt::Result {
         "<div class=\"legend\"><span>0</span><span class=\"scale\" role=\"img\" \
          aria-label=\"Colours of the difference, from white to dark\" \
          style=\"background:linear-gradient(90deg,{colors})\"></span><span>{:.0} % and more</span>\
-         <small>absolute difference, mean over red, green and blue, of the way from black to white; the same \
-         scale on every page</small></div>",
+         <small>absolute difference, mean over red, green and blue, 100 % from black to white; all pages use this \
+         scale</small></div>",
         100.0 * pictures::ERROR_MOST
     )
 }
 
-/// All numbers of all views. Columns that no view has are left out.
+/// Table of the numbers of all views. Columns without a number are left out.
 fn numbers(out: &mut String, all: &[Compared]) -> fmt::Result {
     type Column = (&'static str, fn(&ViewErrors) -> String, fn(&ViewErrors) -> bool);
     let columns: [Column; 6] = [
@@ -221,9 +221,13 @@ fn numbers(out: &mut String, all: &[Compared]) -> fmt::Result {
             |e| e.psnr_box_db.is_some(),
         ),
         ("silhouette IoU", |e| decimals(Some(e.silhouette_iou), 4), |_| true),
-        ("depth error, cm", |e| decimals(e.depth_mae_m.map(|m| 100.0 * m), 1), |e| e.depth_mae_m.is_some()),
         (
-            "its worst tenth from, cm",
+            "mean depth error, cm",
+            |e| decimals(e.depth_mae_m.map(|m| 100.0 * m), 1),
+            |e| e.depth_mae_m.is_some(),
+        ),
+        (
+            "its 90th percentile, cm",
             |e| decimals(e.depth_p90_m.map(|m| 100.0 * m), 1),
             |e| e.depth_p90_m.is_some(),
         ),
@@ -252,7 +256,7 @@ fn numbers(out: &mut String, all: &[Compared]) -> fmt::Result {
     Ok(())
 }
 
-/// Its script finds it by class; without one the first picture stays.
+/// The turntable. The script finds it by class; without scripts the first picture is shown.
 fn turntable(out: &mut String, strip: &Picture) -> fmt::Result {
     let (n, height) = (pictures::FRAMES, strip.height / pictures::FRAMES);
     write!(
@@ -271,19 +275,19 @@ fn turntable(out: &mut String, strip: &Picture) -> fmt::Result {
     )
 }
 
-/// What there was at each step, and what was left out.
+/// Counts after each step, and what was left out.
 fn counts(out: &mut String, run: &Run) -> fmt::Result {
     out.push_str("<section id=\"counts\">\n<h2>From pixels to Gaussians</h2>\n<div class=\"scroll\"><table>\n<tbody>\n");
     for (name, count) in run.counts {
         writeln!(out, "<tr><th scope=\"row\">{name}</th><td>{}</td></tr>", shown::count(*count))?;
     }
-    out.push_str("</tbody>\n</table></div>\n<h3>What was left out</h3>\n");
+    out.push_str("</tbody>\n</table></div>\n<h3>Left out</h3>\n");
     if run.report.left_out.is_empty() {
         out.push_str("<p>Nothing.</p>\n");
     } else {
         out.push_str(
-            "<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">what</th><th scope=\"col\">how many</th>\
-             <th scope=\"col\" class=\"words\">why</th></tr></thead>\n<tbody>\n",
+            "<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">item</th><th scope=\"col\">count</th>\
+             <th scope=\"col\" class=\"words\">reason</th></tr></thead>\n<tbody>\n",
         );
         for left in &run.report.left_out {
             writeln!(
@@ -300,9 +304,9 @@ fn counts(out: &mut String, run: &Run) -> fmt::Result {
     Ok(())
 }
 
-/// What the stages found.
+/// Findings of the stages.
 fn details(out: &mut String, report: &Report) -> fmt::Result {
-    out.push_str("<section id=\"facts\">\n<h2>What the stages found</h2>\n<div class=\"parts\">\n");
+    out.push_str("<section id=\"facts\">\n<h2>Details of the stages</h2>\n<div class=\"parts\">\n");
     for part in facts::parts(report) {
         writeln!(out, "<div class=\"part\">\n<h3>{}</h3>\n<dl>", part.heading)?;
         for (name, value) in part.rows {
@@ -316,14 +320,12 @@ fn details(out: &mut String, report: &Report) -> fmt::Result {
     Ok(())
 }
 
-/// Each input as the method's own check found it.
+/// Result of the method's own check in each input view.
 fn checked(out: &mut String, views: &[CheckedView]) -> fmt::Result {
     if views.is_empty() {
         return Ok(());
     }
-    out.push_str(
-        "<h3>The check of each input, by the camera that was used, and by the camera as given</h3>\n",
-    );
+    out.push_str("<h3>Check of each input view, with the camera as used and as given</h3>\n");
     out.push_str("<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">view</th>");
     for name in ["PSNR, dB", "as given", "silhouette IoU", "as given", "mask covered, %", "as given"] {
         write!(out, "<th scope=\"col\">{name}</th>")?;
@@ -345,22 +347,22 @@ fn checked(out: &mut String, views: &[CheckedView]) -> fmt::Result {
     Ok(())
 }
 
-/// How to make the page again.
+/// Settings, and the command that makes the page again.
 fn settings(out: &mut String, run: &Run) -> fmt::Result {
     let report = run.report;
     let memory = report.peak_rss_bytes.map_or_else(String::new, |bytes| {
-        format!(", {} MB of memory at most", shown::count((bytes / 1_000_000) as usize))
+        format!(", peak memory {} MB", shown::count((bytes / 1_000_000) as usize))
     });
     let json = |value: &dyn Fn() -> serde_json::Result<String>| escaped(&value().unwrap_or_default());
     write!(
         out,
         "<section id=\"settings\">\n<h2>How it was made</h2>\n\
-         <p>vg {}, prior {}, head {}, {} threads{memory}. Pictures are JPEGs of at most {} pixels width; numbers are of \
-         the full size.</p>\n<pre><code>{}</code></pre>\n\
-         <p>Times and memory differ from run to run, and with them what was given seconds to spend. All the rest \
-         comes out the same.</p>\n\
+         <p>vg {}, prior {}, head {}, threads: {}{memory}. Pictures are JPEGs at most {} pixels wide; numbers are \
+         measured at full size.</p>\n<pre><code>{}</code></pre>\n\
+         <p>Times and memory differ from run to run, and so do results that depend on a time limit. All other \
+         results are reproducible.</p>\n\
          <details><summary>Settings</summary><pre><code>{}</code></pre></details>\n\
-         <details><summary>The whole report, as of <code>vg reconstruct --report</code></summary>\
+         <details><summary>The whole report, as written by <code>vg reconstruct --report</code></summary>\
          <pre><code>{}</code></pre></details>\n</section>\n",
         report.version,
         escaped(report.prior),

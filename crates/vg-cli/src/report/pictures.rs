@@ -11,23 +11,23 @@ use vg::Gaussians;
 use vg::progress::Threads;
 use vg::render::{CpuRenderer, RenderOptions, Renderer};
 
-/// Wider pictures are made this wide, pixels.
+/// Largest width of a picture; wider ones are scaled down, pixels.
 pub(super) const MOST_WIDE: u32 = 512;
 
-/// JPEG's, 1 to 100: at this one edges show no ringing beside a photograph.
+/// JPEG quality, 1 to 100; at this value edges show no visible ringing.
 const QUALITY: u8 = 88;
 
-/// The difference that has the last of [`ERROR_COLORS`], as all larger ones have; 1 is from black to white.
+/// Difference from which on the last of [`ERROR_COLORS`] is used; 1 is the difference of black and white.
 pub(super) const ERROR_MOST: f32 = 0.25;
 
-/// Colours of differences from none to [`ERROR_MOST`], in even steps.
+/// Colours of differences from 0 to [`ERROR_MOST`], in even steps.
 pub(super) const ERROR_COLORS: [[u8; 3]; 5] =
     [[255, 255, 255], [255, 222, 115], [244, 125, 60], [193, 29, 74], [54, 5, 66]];
 
-/// Pictures of the turntable.
+/// Number of pictures of the turntable.
 pub(super) const FRAMES: u32 = 36;
 
-/// Their size, pixels; heights of whole JPEG blocks, so that they do not touch in the strip.
+/// Size of a turntable picture, pixels; whole JPEG blocks high, so that neighbours in the strip do not mix.
 const FRAME: (u32, u32) = (384, 288);
 
 /// An encoded picture.
@@ -38,7 +38,7 @@ pub(super) struct Picture {
     pub(super) height: u32,
 }
 
-/// Of colours in [0, 1]; larger ones are white.
+/// Encodes colours in [0, 1]; larger values are clamped.
 pub(super) fn picture((width, height): (u32, u32), colors: &[[f32; 3]]) -> Result<Picture> {
     let full = Rgb32FImage::from_fn(width, height, |u, v| {
         Rgb(colors[(v * width + u) as usize].map(|c| c.clamp(0.0, 1.0)))
@@ -51,7 +51,7 @@ pub(super) fn picture((width, height): (u32, u32), colors: &[[f32; 3]]) -> Resul
     encoded(small.dimensions(), &pixels)
 }
 
-/// The absolute difference of two pictures, the mean over red, green and blue, as a colour.
+/// Encodes the absolute difference of two pictures, the mean over red, green and blue, as a colour.
 pub(super) fn error((width, height): (u32, u32), a: &[[f32; 3]], b: &[[f32; 3]]) -> Result<Picture> {
     let difference = |u: u32, v: u32| {
         let i = (v * width + u) as usize;
@@ -72,10 +72,10 @@ fn error_color(difference: f32) -> [u8; 3] {
     std::array::from_fn(|c| (f32::from(low[c]) * (1.0 - share) + f32::from(high[c]) * share).round() as u8)
 }
 
-/// The model from all around, one picture below the other, the first from ahead and its left.
+/// Renders of the model from all around, one below the other; the first is from the front left.
 pub(super) fn turntable(gaussians: &Gaussians, threads: &Threads) -> Result<Picture> {
     let mut cameras = render::turntable(gaussians, FRAMES, FRAME)?;
-    // A vehicle from straight ahead says least of it.
+    // The view from straight ahead shows least of a vehicle.
     cameras.rotate_left(FRAMES as usize / 10);
     let (renderer, options) = (CpuRenderer::new(), RenderOptions::default());
     let mut strip = Vec::with_capacity((FRAME.0 * FRAME.1 * FRAMES * 3) as usize);
@@ -86,7 +86,7 @@ pub(super) fn turntable(gaussians: &Gaussians, threads: &Threads) -> Result<Pict
     encoded((FRAME.0, FRAME.1 * FRAMES), &strip)
 }
 
-/// The size on the page of a picture of this size.
+/// Size on the page of a picture of this size.
 fn small((width, height): (u32, u32)) -> (u32, u32) {
     if width <= MOST_WIDE {
         return (width, height);
@@ -99,7 +99,7 @@ fn encoded((width, height): (u32, u32), rgb: &[u8]) -> Result<Picture> {
     let mut jpeg = Vec::new();
     JpegEncoder::new_with_quality(&mut jpeg, QUALITY)
         .encode(rgb, width, height, image::ExtendedColorType::Rgb8)
-        .map_err(|e| Failure::job(format!("a picture of {width}x{height}: {e}")))?;
+        .map_err(|e| Failure::job(format!("encoding a picture of {width}x{height}: {e}")))?;
     Ok(Picture { data: format!("data:image/jpeg;base64,{}", STANDARD.encode(jpeg)), width, height })
 }
 
@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn differences_go_from_the_first_colour_to_the_last_and_no_further() {
+    fn differences_map_to_the_colours_and_are_clamped_at_the_last() {
         assert_eq!(error_color(0.0), ERROR_COLORS[0]);
         assert_eq!(error_color(0.5 * ERROR_MOST), ERROR_COLORS[2]);
         assert_eq!([error_color(ERROR_MOST), error_color(1.0)], [ERROR_COLORS[4]; 2]);

@@ -1,9 +1,9 @@
-//! Text for the page: escaped names, numbers as people read them, and a command as a shell takes it.
+//! Text for the page: escaped names, formatted numbers, and a shell command.
 
 use crate::shown;
 use std::ffi::OsString;
 
-/// For HTML, inside elements and inside quoted attributes. Control characters are escaped.
+/// Escapes text for HTML elements and quoted attributes. Control characters become escape sequences.
 pub(super) fn escaped(text: &str) -> String {
     let one = |c: char| match c {
         '&' => "&amp;".into(),
@@ -18,17 +18,17 @@ pub(super) fn escaped(text: &str) -> String {
     text.chars().map(one).collect()
 }
 
-/// Without its unit; of pictures that are the same it is infinite.
+/// PSNR without its unit; "exact" where it is infinite, for identical pictures.
 pub(super) fn psnr(db: f64) -> String {
     if db.is_finite() { format!("{db:.2}") } else { "exact".into() }
 }
 
-/// With so many decimals; a dash where there is none.
+/// A number with `n` decimals; a dash where there is none.
 pub(super) fn decimals(value: Option<f64>, n: usize) -> String {
     value.filter(|v| v.is_finite()).map_or_else(|| "–".into(), |v| format!("{v:.n$}"))
 }
 
-/// Milliseconds with three digits, many of them as seconds.
+/// A time with three digits, in milliseconds or seconds.
 pub(super) fn ms(ms: f64) -> String {
     match ms {
         ms if ms < 9.995 => format!("{ms:.2} ms"),
@@ -38,7 +38,7 @@ pub(super) fn ms(ms: f64) -> String {
     }
 }
 
-/// Four digits, more where they are before the point.
+/// A number with four significant digits, more where they are before the decimal point.
 pub(super) fn number(value: f64) -> String {
     if !value.is_finite() {
         return "–".into();
@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn a_shell_takes_the_command_as_it_was_given() {
+    fn a_shell_parses_the_command_as_it_was_given() {
         let words = ["report", "my car", "--box=4.6,1.9,1.5", "it's", ""].map(OsString::from);
         assert_eq!(command(words.into_iter()), r"vg report 'my car' --box=4.6,1.9,1.5 'it'\''s' ''");
     }

@@ -48,7 +48,7 @@ fn a_scan_gives_the_sample_s_frame_and_says_how_well_it_fits() {
     let at = folder.path();
     write_scan(&at.join("scan.ply"));
     let out = succeed(at, "align {} --scan {}/scan.ply --threads 2 -o {}/v.json").out;
-    for word in ["residual", "confidence", "8 masks", "the other way round"] {
+    for word in ["residual", "confidence", "8 masks", "front and rear swapped"] {
         assert!(out.contains(word), "{out}");
     }
     let (scale, off) = errors(&at.join("v.json"));
@@ -56,17 +56,17 @@ fn a_scan_gives_the_sample_s_frame_and_says_how_well_it_fits() {
     let written = json(&at.join("v.json"));
     assert!(written["residual_m"].as_f64().unwrap() < 0.03 && written["confidence"].as_f64().unwrap() > 0.2);
     assert!((written["scale"].as_f64().unwrap() / truth().scale - 1.0).abs() < 0.01);
-    // The file is what it is for.
+    // The file works as --vehicle-from-world.
     succeed(
         at,
         "reconstruct {} --vehicle-from-world {}/v.json --views 000,001 --prior hull --no-check -o {}/a.ply",
     );
-    // Left out, and said.
+    // A view without a mask is left out and reported.
     fs::remove_file(at.join("masks/007.png")).unwrap();
     let run = succeed_with_warnings(at, "align {} --scan {}/scan.ply -o {}/v.json");
     assert!(run.err.contains("007.png: no mask: looked for masks/"), "{run:?}");
     let out = run.out;
-    assert!(out.contains("7 masks; 1 views without one were left out"), "{out}");
+    assert!(out.contains("7 masks; 1 view without a mask was left out"), "{out}");
 }
 
 #[test]
@@ -133,7 +133,7 @@ fn known_centers_of_the_sample_give_its_similarity_and_small_residuals() {
     centers["003.png"][0] = (x + 2.0).into();
     fs::write(at.join("wrong.json"), serde_json::to_vec(&centers).unwrap()).unwrap();
     let out = succeed(at, "align {} --cameras {}/wrong.json -o {}/v.json").out;
-    assert!(out.contains("003.png: 2.0000 m, left out: it contradicts the others"), "{out}");
+    assert!(out.contains("003.png: 2.0000 m, left out: inconsistent with the others"), "{out}");
     assert_eq!(out.matches("left out").count(), 1);
     assert!(errors(&at.join("v.json")).1 < 1e-9);
 }

@@ -74,7 +74,7 @@ fn splits_that_make_no_sense_are_errors() {
     fs::write(at.join("unknown.json"), r#"{"a": {"input": ["000"], "test": ["999"]}}"#).unwrap();
     fail(at, "eval . --split {}/list.json", 1, &["list.json", "expected"]);
     fail(at, "eval . --split {}/none.json", 1, &["none.json", "no split"]);
-    fail(at, "eval . --split {}/empty.json", 1, &["empty.json", "a: no input or no test view"]);
+    fail(at, "eval . --split {}/empty.json", 1, &["empty.json", "a: no input view or no test view"]);
     fail(at, "eval . --split {}/unknown.json", 1, &["\"999\"", "000.png"]);
     fail(at, "eval . --only sideways", 1, &["sideways", "right_to_left"]);
     fail(at, "eval . --split {}/missing.json", 1, &["missing.json"]);
@@ -263,23 +263,23 @@ fn models_of_other_programs_are_rows() {
         "{run:?}"
     );
     for (import, cause) in [
-        ("no colon", "no name before a colon"),
-        ("a: da3", "no path"),
-        ("a: unheard x.ply", "no such kind"),
-        ("a: vehicle x.ply seconds=-1", "seconds is no number above 0"),
+        ("no colon", "found no colon after a name"),
+        ("a: da3", "found no path"),
+        ("a: unheard x.ply", "unknown KIND"),
+        ("a: vehicle x.ply seconds=-1", "seconds is not a number above 0"),
     ] {
         let run = vg(&["eval", ".", "--import", import]);
         assert!(run.code == 2 && run.err.contains(cause), "{run:?}");
     }
     let run = vg(&["eval", ".", "--import", "a: object x.ply"]);
-    assert!(run.code == 1 && run.err.contains("needs --scan"), "{run:?}");
+    assert!(run.code == 1 && run.err.contains("give --scan"), "{run:?}");
 }
 
 #[test]
 fn options_for_all_rows_have_their_place() {
     let folder = Path::new(".");
     fail(folder, "eval . --table side --prior hull", 2, &["--with"]);
-    fail(folder, "eval . --with --prior=hull", 2, &["--with without --table"]);
+    fail(folder, "eval . --with --prior=hull", 2, &["--with needs --table"]);
     fail(folder, "eval . --table nothing", 2, &["main", "omissions"]);
 }
 

@@ -95,7 +95,7 @@ fn gaussians_that_are_not_drawn_are_named_with_the_way_out() {
     ] {
         ply(&path, &properties, 3, 0.5);
         let out = succeed(folder.path(), "info {}/a.ply").out;
-        for word in ["Gaussians: 3", kind, way_out, "render and refine refuse it"] {
+        for word in ["Gaussians: 3", kind, way_out, "render and refine do not accept it"] {
             assert!(out.contains(word), "{word} in {out}");
         }
         assert!(!out.contains("problems: none"), "{out}");
@@ -110,7 +110,7 @@ fn numbers_without_their_logarithm_and_logit_are_told() {
     let path = folder.path().join("a.ply");
     ply(&path, &[&SHAPE[..], &["f_dc_0", "f_dc_1", "f_dc_2"]].concat(), 200, 0.01);
     let out = succeed(folder.path(), "info {}/a.ply").out;
-    for word in ["every scale is 1.010 m or more", "ln(0.01) = -4.6", "and not their logits"] {
+    for word in ["every scale is 1.010 m or more", "ln(0.01) = -4.6", "instead of logits"] {
         assert!(out.contains(word), "{word} in {out}");
     }
     let run = vg_in(folder.path(), "render {}/a.ply --turntable 1 --size 64x48 -o {}/out");

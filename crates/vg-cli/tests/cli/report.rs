@@ -64,7 +64,7 @@ fn the_page_needs_no_other_file_and_says_what_it_should() {
     }
     assert!(page.contains("vg report . --prior shape -o /"), "no command to make it again");
     assert!(page.contains("<dt>verdict</dt><dd>good</dd>") && !page.contains("class=\"warnings\""));
-    let check = all_between(page, "The check of each input", "</table>")[0];
+    let check = all_between(page, "Check of each input view", "</table>")[0];
     assert_eq!(check.matches("<tr><th scope=\"row\">").count(), 4);
 }
 

@@ -62,7 +62,7 @@ fn no_command_writes_over_a_file_of_its_scene_or_one_that_it_reads() {
         "demo {}/images",
     ];
     for words in among_them {
-        fail(scene.path(), words, 1, &["files of the scene", "choose another folder"]);
+        fail(scene.path(), words, 1, &["part of the scene", "choose another folder"]);
     }
     assert!(contents(scene.path()) == before);
     // What the command makes may be made again.

@@ -1,4 +1,4 @@
-"""What an ONNX file has to look like: the contract "geometry prior", version 1, and those of the segmentation and the
+"""Contracts of ONNX files: the contract "geometry prior", version 1, and those of the segmentation and the
 perceptual distance.
 
 All tensors are float32, views first, without a batch axis. N views of H x W pixels:
@@ -67,9 +67,9 @@ def some_text(text: str) -> str | None:
     return None if text.strip() else "some text"
 
 
-#: Known keys: whether each is required, and what its value may be. Other keys are ignored.
+#: Known keys: whether each is required, and its allowed values. Other keys are ignored.
 Keys = Mapping[str, tuple[bool, Callable[[str], str | None]]]
-#: How photographs come to H x W.
+#: How photographs are resized to H x W.
 FRAMING: Keys = {
     "vg.size_multiple": (False, whole_number),
     "vg.long_side": (False, whole_number),
@@ -81,7 +81,7 @@ ORIGIN: Keys = {"vg.license": (False, some_text), "vg.weights": (False, some_tex
 
 
 class Contract(NamedTuple):
-    """What one kind of file promises."""
+    """Contract of one kind of file."""
 
     keys: Keys
     inputs: Mapping[str, Shape]
@@ -123,11 +123,11 @@ LPIPS = Contract(
 
 
 class ContractError(Exception):
-    """A file is not what the contract says: which part, what was found, what is allowed."""
+    """A file that violates the contract: which part, what was found, what is allowed."""
 
 
 def stamp(path: str | os.PathLike[str], entries: Mapping[str, str]) -> None:
-    """Writes metadata into a finished file, in place of its own under the same keys.
+    """Writes metadata into a finished file and replaces values of the same keys.
 
     The weights stay where they are: a file of external data is neither read nor written.
     """
@@ -138,7 +138,7 @@ def stamp(path: str | os.PathLike[str], entries: Mapping[str, str]) -> None:
     del model.metadata_props[:]
     for key, value in known.items():
         model.metadata_props.add(key=key, value=value)
-    # Beside the file itself, so that the names of external data stay right while it is written.
+    # In the folder of the file, so that the names of external data stay valid while it is written.
     unfinished = path.with_name(path.name + ".unfinished")
     try:
         onnx.save(model, unfinished)
@@ -148,7 +148,7 @@ def stamp(path: str | os.PathLike[str], entries: Mapping[str, str]) -> None:
 
 
 def check(path: str | os.PathLike[str]) -> dict[str, str]:
-    """Raises ContractError unless the file keeps the contract; returns its metadata."""
+    """Checks the file against the contract and returns its metadata; raises ContractError."""
     path = Path(path)
     model = load(path)
     metadata = {entry.key: entry.value for entry in model.metadata_props}
@@ -205,7 +205,7 @@ def check_metadata(metadata: Mapping[str, str], keys: Keys) -> None:
 def check_values(
     kind: str, values: Any, shapes: Mapping[str, Shape], required: tuple[str, ...], sizes: dict[str, int | str]
 ) -> None:
-    """Names, types and shapes; `sizes` collects what N, H and W are: a number, or "dynamic"."""
+    """Checks names, types and shapes; `sizes` collects N, H and W: a number, or "dynamic"."""
     found = {value.name: value.type.tensor_type for value in values}
     for name in found:
         if name not in shapes:
@@ -235,7 +235,7 @@ def shown(shape: Any) -> str:
 
 
 def check_size(metadata: Mapping[str, str], sizes: Mapping[str, int | str]) -> None:
-    """A fixed size fits its own rule; a dynamic one has a rule."""
+    """Checks that a fixed size meets its own rule and that a dynamic one has a rule."""
     dynamic = "dynamic" in (sizes["H"], sizes["W"])
     for key in ("vg.size_multiple", "vg.long_side"):
         if dynamic and key not in metadata:
@@ -248,7 +248,7 @@ def check_size(metadata: Mapping[str, str], sizes: Mapping[str, int | str]) -> N
 
 
 def check_operators(model: Any) -> None:
-    """Only what every ONNX Runtime has: the standard operators, and functions that the file itself defines."""
+    """Checks that only standard operators, and functions that the file itself defines, are used."""
     own = {function.domain for function in model.functions}
     for graph in [model.graph, *model.functions]:
         for node in graph.node:
@@ -257,7 +257,7 @@ def check_operators(model: Any) -> None:
 
 
 def check_external_data(model: Any, path: Path) -> None:
-    """The weights beside the file are there and long enough."""
+    """Checks that the external weights exist and are long enough."""
     external = need_onnx().TensorProto.EXTERNAL
     for tensor in model.graph.initializer:
         if tensor.data_location != external:

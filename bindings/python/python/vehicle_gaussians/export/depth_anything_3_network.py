@@ -26,14 +26,14 @@ from .graph import (
 from .script import Unavailable, need
 
 PATCH = 14
-#: Upstream's, in the caller's unit: the median camera distance is not taken to be less.
+#: Upstream's lower limit of the median camera distance, in the caller's unit.
 LEAST_DISTANCE = 0.1
-#: What the wrapper calls; other parts of a checkpoint (Gaussians, the metric branch) are left out.
+#: Parts that the wrapper uses; other parts of a checkpoint (Gaussians, the metric branch) are left out.
 PARTS = ("backbone", "head", "cam_enc", "cam_dec")
 
 
 class DepthAnything3Prior(nn.Module):
-    """Images, intrinsics and poses to depth along the optical axis; `size` is (width, height)."""
+    """Estimates depth along the optical axis from images, intrinsics and poses; `size` is (width, height)."""
 
     OUTPUTS = ("depth", "confidence", "cam_to_ref_pred")
 
@@ -82,7 +82,7 @@ class DepthAnything3Prior(nn.Module):
 
 
 def median(values: Tensor) -> Tensor:
-    """The lower one of two, as torch has it; by sorting, because the export knows no median. (1)"""
+    """Median, the lower of the middle two as in torch; by sorting, because the exporter has no median. (1)"""
     middle = torch.arange(values.shape[0])[-1:] // 2
     return values.sort().values.index_select(0, middle)
 

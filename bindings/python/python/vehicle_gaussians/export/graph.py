@@ -32,7 +32,7 @@ from .script import Unavailable
 IMAGENET_MEAN, IMAGENET_STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 #: Metres. Cameras closer together than this say nothing about the scale.
 LEAST_BASELINE = 1e-4
-#: What the tracer may assume, so that comparisons with upstream's limits of memory are settled; the file takes more.
+#: Limit that the tracer may assume, which decides comparisons with upstream's memory limits; the file accepts more.
 MOST_VIEWS = 32
 #: Largest difference between torch and onnxruntime, relative to the largest value of an output where that is above 1.
 #: The published network with random weights reached 1.1e-4, in rays that were nearly zero before they were normalised.
@@ -40,7 +40,7 @@ PARITY = 1e-3
 
 
 class Given(NamedTuple):
-    """What is known of the cameras, as the network takes it."""
+    """The cameras in the form that the network takes."""
 
     #: Unit vectors through the pixel centres, camera axes, (N,3,H,W).
     rays: Tensor
@@ -67,7 +67,7 @@ class Network(Protocol):
     fused_level: bool
     #: (C), learned: the token that the scale is read from.
     scale_token: Tensor
-    #: (D), added to the tokens of view 0; None if no view is told apart.
+    #: (D), added to the tokens of view 0; None if all views are equal.
     reference: Tensor | None
 
     def encode_images(self, images: Tensor) -> tuple[Tensor, Tensor | None]:
@@ -139,7 +139,7 @@ class MultiViewPrior(nn.Module):
         )
 
     def fused(self, images: Tensor, given: Given) -> tuple[Tensor, Tensor | None]:
-        """Image tokens with everything known of the cameras added, (N,T,C), and the tokens besides, (N,R,C)."""
+        """Image tokens with the camera tokens added, (N,T,C), and the tokens besides, (N,R,C)."""
         network = self.network
         tokens, extra = network.encode_images((images - self.mean) / self.std)
         # Where there is no distance its logarithm is that of a rounding error, which no network was trained on.
@@ -273,7 +273,7 @@ def example_inputs(views: int, width: int, height: int, seed: int = 0) -> dict[s
 
 @dataclass(frozen=True)
 class Difference:
-    """How far onnxruntime is from torch in one output."""
+    """Difference between onnxruntime and torch in one output."""
 
     case: str
     output: str
@@ -302,7 +302,7 @@ def write(
     traced: the inputs to trace with. dynamic: per input the axes that stay free. cases: inputs to compare with.
     """
     module = module.float().eval()
-    # Before the export: what upstream caches on the way has to hold real tensors, not those of the tracer.
+    # Run before the export, so that upstream's caches hold real tensors and not those of the tracer.
     with torch.no_grad():
         references = {name: module(*inputs.values()) for name, inputs in cases.items()}
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -318,7 +318,7 @@ def write(
                 f"{worst.output}: onnxruntime is {worst.largest:.2g} from torch with {worst.case}; "
                 f"allowed: {PARITY:g} of {max(1.0, worst.value):.3g}; nothing was written"
             )
-        # The weights first: a file that is there is complete.
+        # The weights are moved first, so that an existing file is complete.
         for file in sorted(Path(folder).iterdir(), key=lambda file: file.name == path.name):
             os.replace(file, path.parent / file.name)
     return differences
@@ -334,7 +334,7 @@ def trace(
     external: bool,
 ) -> None:
     with warnings.catch_warnings(), torch.no_grad():
-        # The exporter's remarks on its own internals; what matters is checked afterwards.
+        # Ignores the exporter's warnings about its internals; the result is checked afterwards.
         warnings.simplefilter("ignore")
         torch.onnx.export(
             module,
@@ -355,7 +355,7 @@ def trace(
 
 
 def refuse_fixed_axes(model: Any, dynamic: Mapping[str, Mapping[int, Any]]) -> None:
-    """The exporter drops an axis that the code depends on to a constant, without a word."""
+    """Detects dynamic axes that the exporter has silently made constant."""
     for value in model.graph.input:
         for axis in dynamic[value.name]:
             dim = value.type.tensor_type.shape.dim[axis]
@@ -418,7 +418,7 @@ def write_prior(
     opset: int,
     external: bool,
 ) -> None:
-    """A geometry prior of fixed H x W for any number of views; prints how well torch and onnxruntime agree."""
+    """Exports a geometry prior of fixed H x W for any number of views; prints how well torch and onnxruntime agree."""
     print(f"exporting {width}x{height}, opset {opset} ...", flush=True)
     # Traced with two: one view would let the exporter take the axis for a constant.
     views = {0: torch.export.Dim("N", min=1, max=MOST_VIEWS)}
@@ -481,7 +481,7 @@ def file_hash(path: Path) -> str:
 
 
 def tensor_hash(module: Any) -> str:
-    """SHA-256 over names, shapes and values, for weights that are in no file."""
+    """SHA-256 over names, shapes and values, for weights that are not in a file."""
     digest = hashlib.sha256()
     for name, tensor in sorted(module.state_dict().items()):
         digest.update(f"{name} {tuple(tensor.shape)} {tensor.dtype};".encode())

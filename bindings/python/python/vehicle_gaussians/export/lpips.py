@@ -16,7 +16,7 @@ from .script import Unavailable, need, need_exporter, parser, run
 
 #: Pixels; the deepest layers of a smaller picture are empty.
 LEAST_SIDE = 64
-#: Of the heads and of torchvision's code and weights, as the packages state them.
+#: Licences of the heads and of torchvision's code and weights, as the packages state them.
 LICENCE = "BSD-2-Clause (lpips), BSD-3-Clause (torchvision)"
 
 

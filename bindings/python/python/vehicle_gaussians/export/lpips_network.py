@@ -35,7 +35,7 @@ class PerceptualDistance(nn.Module):
 def built(net: str) -> Any:
     """The package's own heads on a backbone of random weights."""
     with warnings.catch_warnings():
-        # The package speaks to torchvision in words of 2017.
+        # The package uses torchvision's arguments of 2017.
         warnings.simplefilter("ignore")
         return LPIPS(net=net, pnet_rand=True, verbose=False)
 

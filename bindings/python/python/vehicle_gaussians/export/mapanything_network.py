@@ -18,7 +18,7 @@ from uniception.models.prediction_heads.base import (
 from .graph import Given, fix_position_embedding, refuse_missing_tensors
 from .script import Unavailable, config_of, need
 
-#: What the wrapper's activations are for: ray, depth along it, pose, confidence and mask.
+#: Representation that the wrapper's activations assume: ray, depth along it, pose, confidence and mask.
 REPRESENTATION = "raydirs+depth+pose+confidence+mask"
 
 
@@ -93,12 +93,12 @@ def load(folder: Path) -> Any:
     config = config_of(folder)
     encoder = dict(config.get("encoder_config", {}))
     if encoder.get("uses_torch_hub"):
-        # Of torch.hub only the code is wanted: the weights are in the folder.
+        # Only the code of torch.hub is needed: the weights are in the folder.
         encoder["torch_hub_pretrained"] = False
     model = built(lambda: MapAnything.from_pretrained(str(folder), encoder_config=encoder))
     file = folder / "model.safetensors"
     with need("safetensors", "pip install safetensors").safe_open(str(file), framework="pt") as opened:
-        # Upstream loads whatever names fit.
+        # Upstream loads all weights whose names match.
         refuse_missing_tensors(model, set(opened.keys()), file)
     return model
 

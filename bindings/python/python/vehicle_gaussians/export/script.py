@@ -1,4 +1,4 @@
-"""What the export programs share before torch is there: options, and words for what is missing."""
+"""Code that the export programs share before torch is imported: options, and errors for missing requirements."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PACKAGES = "pip install torch onnx onnxscript onnxruntime"
 
 
 class Unavailable(Exception):
-    """Something that a program needs is not there; one line that says what, and what helps."""
+    """A missing requirement of a program; one line that names it and the remedy."""
 
 
 def need(module: str, command: str) -> Any:
@@ -28,13 +28,13 @@ def need(module: str, command: str) -> Any:
 
 
 def need_exporter() -> None:
-    """What every export needs."""
+    """Options of every export."""
     for module in ("torch", "onnx", "onnxscript", "onnxruntime"):
         need(module, PACKAGES)
 
 
 def run(name: str, main: Callable[[], int]) -> int:
-    """Exit code 2 and one line, without a traceback, for what the user can mend."""
+    """Exits with code 2 and one line, without a traceback, for errors that the user can correct."""
     try:
         return main()
     except Unavailable as error:
@@ -123,7 +123,7 @@ def licence(weights: str, known: dict[str, str], stated: str | None) -> str:
 
 
 def downloaded(address: str, what: str, option: str) -> Path:
-    """The file of a public address: in torch's cache, or downloaded there; `option` takes one that is at hand."""
+    """The file of a public address: in torch's cache, or downloaded there; `option` names a local file instead."""
     hub = need("torch.hub", PACKAGES)
     name = address.rpartition("/")[2]
     file = Path(hub.get_dir()) / "checkpoints" / name

@@ -16,9 +16,9 @@ from pathlib import Path
 from .script import Unavailable, need, need_exporter, parser, run, size
 
 ARCHITECTURES = ["deeplabv3_resnet50", "deeplabv3_mobilenet_v3_large", "lraspp_mobilenet_v3_large"]
-#: Of torchvision's code and weights, as the package states it.
+#: Licence of torchvision's code and weights, as the package states it.
 LICENCE = "BSD-3-Clause (torchvision)"
-#: Pixels; below, the deepest layers see next to nothing.
+#: Pixels; for smaller pictures, the deepest layers have almost no pixels.
 LEAST_SIDE = 64
 
 
@@ -62,7 +62,7 @@ def main(arguments: list[str] | None = None) -> int:
     differences = write(
         segmentation_network.VehicleProbability(network, segmentation_network.vehicle_classes(chosen.net)),
         chosen.output,
-        # Traced with two: one view would let the exporter take the axis for a constant.
+        # Traced with two pictures: with one, the exporter could make the axis constant.
         segmentation_network.example_inputs(2, height, width, seed=0),
         {"images": {0: torch.export.Dim("N", min=1, max=64)}},
         ["mask"],

@@ -11,7 +11,7 @@ from torchvision.models import get_model, get_model_weights
 
 from .script import Unavailable, downloaded
 
-#: Of the classes of Pascal VOC.
+#: Vehicles among the classes of Pascal VOC.
 VEHICLES = ("bus", "car")
 #: Normalisation of torchvision's networks.
 MEAN, STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
@@ -28,7 +28,7 @@ class VehicleProbability(nn.Module):
 
     def forward(self, images: Tensor) -> tuple[Tensor]:
         scores = self.network((images - self.mean) / self.std)["out"]
-        # A sum of shares may be 1 and a little more.
+        # A sum of probabilities may exceed 1 by rounding.
         return (scores.softmax(1)[:, self.classes].sum(1).clamp(0, 1),)
 
 

@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from .graph import Given
 
 CHANNELS, WIDTH, HEADS, LEVEL = 64, 96, 4, 24
-#: How far random answers may lie from the given ones.
+#: Largest deviation of the random outputs from the given values.
 CORRECTION = 0.01
 
 
