@@ -299,7 +299,7 @@ fn what_does_not_go_together_is_refused_by_the_names_of_the_header() {
         opened_with(&prior_path, &vg_model_options { runtime: manifest.as_ptr(), ..nowhere }).err().unwrap();
     assert!(status == vg_status::Argument && words.starts_with("options.runtime: "), "{words}");
     let (status, words) = opened_with(Path::new("/"), &model_options(1)).err().unwrap();
-    assert!(status == vg_status::Argument && words.starts_with("path: /, no file"), "{words}");
+    assert!(status == vg_status::Argument && words.starts_with("path: /, not a file"), "{words}");
     let (status, words) = opened_with(Path::new("/nowhere/m.onnx"), &model_options(1)).err().unwrap();
     assert!(status == vg_status::Io && words.starts_with("/nowhere/m.onnx: "), "{words}");
     let manifest = vg_testing::root().join("Cargo.toml");
@@ -356,7 +356,10 @@ fn a_mask_of_c_is_that_of_rust() {
         let status = vg_segment(prior.0, &raw const lent.image, camera, null(), to, stride, &raw mut error);
         refusal(status, error)
     };
-    assert!(status == vg_status::Format && words.contains("a geometry prior, no segmentation"), "{words}");
+    assert!(
+        status == vg_status::Format && words.contains("a geometry prior, not a segmentation network"),
+        "{words}"
+    );
     assert!(untouched.iter().all(|&byte| byte == 77));
 }
 

@@ -72,7 +72,7 @@ impl vg_refine_options {
                 seconds => Amount::Seconds(seconds),
             },
             hold_out: read::flag("options.hold_out", self.hold_out)?,
-            densify: read::flag("options.densify", self.densify)?.then(Densify::of_refinement),
+            densify: read::flag("options.densify", self.densify)?.then(Densify::for_refinement),
             backend: backend("options.backend", self.backend)?,
             ..RefineOptions::default()
         };

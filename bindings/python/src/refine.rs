@@ -41,7 +41,7 @@ pub(crate) fn refine(
             return Err(bad_value(py, "seconds", &found, "only one of the two"));
         }
     };
-    let densify = densify.then(Densify::of_refinement);
+    let densify = densify.then(Densify::for_refinement);
     let backend = chosen(py, "backend", backend)?;
     let options = RefineOptions { amount, hold_out, densify, backend, ..RefineOptions::default() };
     let named = |error| match error {

@@ -418,7 +418,7 @@ def test_errors_have_the_same_codes_and_texts(ellipsoid: Views, tmp_path: Path) 
     assert caught.value.code is Status.IO
     for face, made in ((vg, vg.reconstruct), (capi, capi.reconstruct)):
         car = made(ellipsoid.images, ellipsoid.masks, ellipsoid.cameras, ellipsoid.depths, check=False).gaussians
-        with pytest.raises(vg.VgError, match="car.spz, a name of SPZ.*ends in .ply") as caught:
+        with pytest.raises(vg.VgError, match="car.spz, the extension of SPZ.*ends in .ply") as caught:
             car.save_ply(tmp_path / "car.spz")
         assert caught.value.code is Status.ARGUMENT, face
     assert not (tmp_path / "car.spz").exists()

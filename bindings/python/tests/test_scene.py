@@ -61,7 +61,7 @@ def test_what_looks_like_a_mistake_is_a_warning(tmp_path: Path) -> None:
         del frame["mask_path"]
     file.write_text(json.dumps(scene))
     shutil.rmtree(tmp_path / "car" / "masks")
-    with pytest.warns(UserWarning, match=r"no view has a mask: looked for masks/\{000,000.png,000_mask") as caught:
+    with pytest.warns(UserWarning, match=r"no view has a mask; searched for masks/\{000,000.png,000_mask") as caught:
         vg.open_scene(tmp_path / "car", "000")
     assert caught[0].filename == __file__
 

@@ -1,7 +1,7 @@
-//! Masks from a network, where nobody made any: contract "segmentation", version 1 (docs/ONNX.md).
+//! Masks from a network, for views without one: contract "segmentation", version 1 (docs/ONNX.md).
 //!
-//! The network says which pixels show a vehicle, any vehicle. Which of them is the one to reconstruct says the pose:
-//! it stands at the origin of the vehicle frame. Cars beside it and behind it are background.
+//! The network marks the pixels of all vehicles. The pose determines which vehicle to reconstruct: the one at the
+//! origin of the vehicle frame. Cars next to it and behind it become background.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -13,18 +13,18 @@ use vg_scene::mask::{Label, Mask};
 use vg_scene::onnx::{Broken, Input, Model, Ports};
 use vg_scene::{RgbImage, View};
 
-/// Pixels that are vehicle with at least this probability are.
+/// Minimum probability of vehicle pixels.
 const PROBABLE: f32 = 0.5;
 
-/// Rays that pass the origin of the vehicle frame closer than this can show the vehicle, metres: half the diagonal
-/// of a large van. Of longer ones most pixels do.
+/// Largest distance from the origin of the vehicle frame to rays that can show the vehicle, metres: half the diagonal
+/// of a large van. For longer vehicles this still covers most pixels.
 const REACH_M: f64 = 3.0;
 
-/// Pieces of one vehicle are no farther apart than this share of the largest piece's diagonal: a tree takes less of a
-/// car, the gap between two parked ones more.
+/// Largest gap between pieces of one vehicle, as a share of the largest piece's diagonal: a tree hides less of a car,
+/// and the gap between two parked cars is wider.
 const GAP_SHARE: f64 = 0.08;
 
-/// Holes smaller than this share of the vehicle are filled: one pixel of background is a hole through the hull.
+/// Area, as a share of the vehicle, up to which holes are filled: one pixel of background is a hole through the hull.
 const HOLE_SHARE: f64 = 0.02;
 
 /// A segmentation network. Clones share the open model.
@@ -38,14 +38,14 @@ pub struct Segmenter {
 }
 
 impl Segmenter {
-    /// For a model that keeps the contract; [`Error::Format`] says what breaks it.
+    /// A segmenter that runs `model`; [`Error::Format`] names what breaks the contract.
     pub fn new(model: Model) -> Result<Self> {
         let (framing, name, mask) =
             Self::read(model.ports()).map_err(|broken| model.broken(broken.field, broken.reason))?;
         Ok(Self { model, framing, name, mask })
     }
 
-    /// What the network calls itself.
+    /// The network's name, from its metadata.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -56,7 +56,7 @@ impl Segmenter {
             if let Some(name) = ports.metadata.get(key) {
                 return Err(Broken::new(
                     format!("metadata {key}"),
-                    format!("{name:?}: {what}, no segmentation"),
+                    format!("{name:?}: {what}, not a segmentation network"),
                 ));
             }
         }
@@ -64,7 +64,7 @@ impl Segmenter {
         let framing = Framing::read(ports, Resize::Stretch)?;
         if let Some(n) = framing.views.filter(|n| *n != 1) {
             let reason =
-                format!("takes {n} views at once; allowed: 1 or any number, views are shown one by one");
+                format!("{n} views per run; allowed: 1 or any number, since views are segmented one by one");
             return Err(Broken::new("input images", reason));
         }
         let images = ports.required_input("images", &[None, Some(3), None, None])?;
@@ -73,12 +73,12 @@ impl Segmenter {
         Ok((framing, name, mask))
     }
 
-    /// Which pixels show the vehicle at the origin of the camera's vehicle frame: none if the network sees no vehicle
-    /// there. Pixels that the network was not shown are unknown. Runs in the rayon pool it is called from.
+    /// The mask of the vehicle at the origin of the camera's vehicle frame; empty if the network finds no vehicle
+    /// there. Pixels outside the network's crop are unknown. Runs in the rayon pool it is called from.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a picture that is not of the camera's size, or of a shape far from the network's;
-    /// [`Error::Format`] where what the network says breaks the contract.
+    /// [`Error::Argument`] for a picture that does not have the camera's size, or has an aspect ratio far from the
+    /// network's; [`Error::Format`] if an output of the network breaks the contract.
     pub fn mask(&self, image: &RgbImage, camera: &Camera) -> Result<Mask> {
         camera.validate("camera")?;
         let (width, height) = (camera.width, camera.height);
@@ -88,7 +88,7 @@ impl Segmenter {
         }
         let size = self.framing.size_for(f64::from(width) / f64::from(height));
         let fit = Fit::new(width, height, size, self.framing.resize).ok_or_else(|| {
-            let allowed = format!("a shape nearer to the network's {} x {}", size.0, size.1);
+            let allowed = format!("an aspect ratio nearer to the network's {} x {}", size.0, size.1);
             Error::argument("image", found(), allowed)
         })?;
         let probabilities = self.run(image, &fit)?;
@@ -100,10 +100,10 @@ impl Segmenter {
                 Some(_) => Label::Background,
             })
             .collect();
-        Mask::new(width, height, the_vehicle(labels, camera))
+        Mask::new(width, height, select_vehicle(labels, camera))
     }
 
-    /// Gives the views that have no mask one; how many there were. An error names the view.
+    /// Adds masks to the views that have none; returns the number of these views. An error names the view.
     pub fn fill(&self, views: &mut [View]) -> Result<usize> {
         let mut filled = 0;
         for (i, view) in views.iter_mut().enumerate().filter(|(_, view)| view.mask.is_none()) {
@@ -119,7 +119,7 @@ impl Segmenter {
         Ok(filled)
     }
 
-    /// Probabilities at the network's size.
+    /// Runs the network; returns probabilities at the network's size.
     fn run(&self, image: &RgbImage, fit: &Fit) -> Result<Vec<f32>> {
         let (width, height) = (fit.size.0 as usize, fit.size.1 as usize);
         let picture = fit.picture(image, &self.framing);
@@ -127,23 +127,25 @@ impl Segmenter {
         let mut outputs = self.model.run(&[input])?;
         let mask = self.model.output(&mut outputs, self.mask, &[1, height, width])?;
         match mask.iter().find(|p| !(0.0..=1.0).contains(*p)) {
-            Some(p) => Err(self.model.broken("output mask", format!("{p} came of a run; allowed: 0 to 1"))),
+            Some(p) => {
+                Err(self.model.broken("output mask", format!("the network returned {p}; allowed: 0 to 1")))
+            }
             None => Ok(mask),
         }
     }
 }
 
-/// Of the pixels that show vehicles those that show the one at the origin, without small holes.
-fn the_vehicle(mut labels: Vec<Label>, camera: &Camera) -> Vec<Label> {
+/// Keeps the vehicle at the origin, without small holes, and makes other vehicles background.
+fn select_vehicle(mut labels: Vec<Label>, camera: &Camera) -> Vec<Label> {
     let width = camera.width as usize;
     let center = camera.vehicle_from_camera.inverse().translation;
     let is_near = |pixel: usize| passes_near(camera, pixel, center);
     let patches = patches(&labels, width, Label::Vehicle);
-    // The pixels of each patch, and how many of them can show the vehicle.
+    // The number of pixels of each patch that can show the vehicle.
     let near: Vec<usize> = patches.par_iter().map(|p| p.iter().filter(|&&i| is_near(i)).count()).collect();
     let best = (0..patches.len()).max_by_key(|&k| (near[k], std::cmp::Reverse(k))).filter(|&k| near[k] > 0);
     let bounds: Vec<[usize; 4]> = patches.iter().map(|patch| bounds(patch, width)).collect();
-    // Posts and trees cut a vehicle in pieces.
+    // Posts and trees divide a vehicle into pieces.
     let is_piece = |k: usize, best: usize| {
         2 * near[k] > patches[k].len() && gap(bounds[k], bounds[best]) <= GAP_SHARE * diagonal(bounds[best])
     };
@@ -170,18 +172,18 @@ fn the_vehicle(mut labels: Vec<Label>, camera: &Camera) -> Vec<Label> {
     labels
 }
 
-/// Whether a pixel's ray passes `center`, a point in the camera frame, within reach.
+/// Whether a pixel's ray passes `center`, a point in the camera frame, within [`REACH_M`].
 fn passes_near(camera: &Camera, pixel: usize, center: DVec3) -> bool {
     let (u, v) = (pixel as u32 % camera.width, pixel as u32 / camera.width);
     let Some(ray) = camera.ray([f64::from(u) + 0.5, f64::from(v) + 0.5]) else { return false };
     let ray = ray.normalize();
     let along = ray.dot(center);
-    // From inside the reach every direction may show it.
+    // A camera within reach may see the vehicle in every direction.
     let closest = center - ray * along.max(0.0);
     closest.length() <= REACH_M
 }
 
-/// First and last column and row: `[u0, v0, u1, v1]`.
+/// First and last column and row of a patch: `[u0, v0, u1, v1]`.
 fn bounds(patch: &[usize], width: usize) -> [usize; 4] {
     patch.iter().fold([usize::MAX, usize::MAX, 0, 0], |[u0, v0, u1, v1], i| {
         let (u, v) = (i % width, i / width);
@@ -189,7 +191,7 @@ fn bounds(patch: &[usize], width: usize) -> [usize; 4] {
     })
 }
 
-/// Pixels between two boxes along the axis on which there are more.
+/// Pixels between two boxes, along the axis with the wider gap.
 fn gap(a: [usize; 4], b: [usize; 4]) -> f64 {
     let between = |k: usize| {
         let apart = a[k].saturating_sub(b[k + 2]).max(b[k].saturating_sub(a[k + 2]));
@@ -202,7 +204,7 @@ fn diagonal([u0, v0, u1, v1]: [usize; 4]) -> f64 {
     ((u1 - u0) as f64).hypot((v1 - v0) as f64)
 }
 
-/// Pixels of a label that hang together by their sides, a list for each patch, in the order of their first pixels.
+/// 4-connected components of a label, each a list of pixels, in the order of their first pixels.
 fn patches(labels: &[Label], width: usize, label: Label) -> Vec<Vec<usize>> {
     let mut seen = vec![false; labels.len()];
     let mut patches = Vec::new();
@@ -252,7 +254,7 @@ mod tests {
         Camera::pinhole(WIDTH, HEIGHT, intrinsics, pose).unwrap()
     }
 
-    /// Labels from a drawing, ten by ten pixels a character.
+    /// Labels from a drawing with ten by ten pixels per character.
     fn drawn(rows: [&str; 6]) -> Vec<Label> {
         let character = |i: u32| rows[(i / WIDTH / 10) as usize].as_bytes()[(i % WIDTH / 10) as usize];
         let label = |i: u32| match character(i) {
@@ -264,8 +266,8 @@ mod tests {
     }
 
     #[test]
-    fn cars_beside_and_behind_are_background() {
-        let made = the_vehicle(
+    fn other_cars_become_background() {
+        let made = select_vehicle(
             drawn(["#.......", "........", ".####..#", ".####..#", "........", "........"]),
             &camera(),
         );
@@ -278,11 +280,11 @@ mod tests {
         for v in 20..40 {
             pieces[v * WIDTH as usize + 40..][..2].fill(Label::Background);
         }
-        assert!(the_vehicle(pieces.clone(), &camera()) == pieces);
-        // A gap of ten pixels is one between two cars.
+        assert!(select_vehicle(pieces.clone(), &camera()) == pieces);
+        // A gap of ten pixels separates two cars.
         let two = drawn(["........", "........", "#.#####.", "#.#####.", "........", "........"]);
         assert!(
-            the_vehicle(two, &camera())
+            select_vehicle(two, &camera())
                 == drawn(["........", "........", "..#####.", "..#####.", "........", "........"])
         );
     }
@@ -293,25 +295,25 @@ mod tests {
         let kept = labels.clone();
         let pinhole = 25 * WIDTH as usize + 55;
         labels[pinhole] = Label::Background;
-        assert!(the_vehicle(labels, &camera()) == kept);
+        assert!(select_vehicle(labels, &camera()) == kept);
     }
 
     #[test]
     fn a_long_vehicle_is_kept_whole_and_none_is_none() {
         let long = drawn(["........", "........", "########", "########", "........", "........"]);
-        assert!(the_vehicle(long.clone(), &camera()) == long);
+        assert!(select_vehicle(long.clone(), &camera()) == long);
         let none = drawn(["........"; 6]);
-        assert!(the_vehicle(none.clone(), &camera()) == none);
-        // Nothing within reach: a camera that looks the other way.
+        assert!(select_vehicle(none.clone(), &camera()) == none);
+        // A camera that looks the other way has nothing within reach.
         let away =
             Pose::new("pose", DMat3::from_cols(-DVec3::X, -DVec3::Z, -DVec3::Y), DVec3::new(0.0, -7.0, 0.5));
         let away = Camera { vehicle_from_camera: away.unwrap(), ..camera() };
-        assert!(the_vehicle(long, &away) == none);
+        assert!(select_vehicle(long, &away) == none);
     }
 
     #[test]
-    fn what_was_not_shown_is_unknown_and_no_hole() {
+    fn cropped_pixels_stay_unknown_and_make_no_hole() {
         let labels = drawn(["????????", ".######.", ".######.", ".######.", "........", "????????"]);
-        assert!(the_vehicle(labels.clone(), &camera()) == labels);
+        assert!(select_vehicle(labels.clone(), &camera()) == labels);
     }
 }

@@ -73,7 +73,7 @@ fn equal_ends_are_refused_until_somebody_says_which_is_the_front() {
     assert!(error.contains("forward if 000.png was taken from ahead"), "{error}");
     // The first view stands 29 degrees left of straight ahead.
     let forward = to_scan(&views, &sparse, &points, Heading::Forward).unwrap();
-    assert_eq!(forward.asked_view.as_deref(), Some("000.png"));
+    assert_eq!(forward.heading_view.as_deref(), Some("000.png"));
     assert!(forward.confidence < 0.1);
     assert_close("forward", &forward.vehicle_from_world, &truth);
     let backward = to_scan(&views, &sparse, &points, Heading::Backward).unwrap();

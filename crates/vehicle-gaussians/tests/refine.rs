@@ -89,7 +89,7 @@ fn a_view_held_out_tells_when_to_stop() {
 fn who_divides_keeps_a_mirror_image() {
     let scene = right_side(64, 48);
     // All that is seen wants company.
-    let densify = Some(Densify { gradient: 0.0, most: 9_000, ..Densify::of_refinement() });
+    let densify = Some(Densify { gradient: 0.0, most: 9_000, ..Densify::for_refinement() });
     let of =
         |threads: usize| run(&scene, &Options { threads, ..options(RefineOptions { densify, ..steps(60) }) });
     let made = of(2);

@@ -96,7 +96,7 @@ fn by_box(args: &AlignArgs, size: [f64; 3]) -> Result<Found> {
     let lines = vec![
         masks_line(found.views, &scene),
         format!("the visual hull of the masks measures {l:.3} x {w:.3} x {h:.3} m"),
-        format!("front decided by view {}", found.asked_view),
+        format!("front decided by view {}", found.heading_view),
     ];
     let quality = FitQuality { residual_m: found.residual_m, confidence: found.confidence };
     let notes = scene.notes;

@@ -37,7 +37,7 @@ pub(crate) fn run(args: &RefineArgs) -> Result {
     let settings = RefineOptions {
         amount: args.amount,
         hold_out: args.hold_out,
-        densify: args.densify.then(Densify::of_refinement),
+        densify: args.densify.then(Densify::for_refinement),
         backend: args.backend,
         ..RefineOptions::default()
     };

@@ -5,7 +5,7 @@ use crate::unfolded::Unfolded;
 use crate::{Camera, Error, Intrinsics, Result};
 use rayon::prelude::*;
 
-/// The pinhole may be this many times the source's width and height; wider corners are cut.
+/// Maximum of the pinhole's width and height relative to the source; the rest is cropped.
 const MAX_GROWTH: f64 = 2.0;
 
 /// A pinhole with the same focal lengths and pose whose image plane covers the source's picture.
@@ -34,8 +34,8 @@ pub fn pinhole_for(source: &Camera) -> Result<Camera> {
             "a lens model that can be inverted inside the picture",
         ));
     }
-    // Never beyond the allowed growth, nor beyond what a camera may be. What is cut is cut evenly around the source's
-    // own frame where the picture reaches beyond it on both sides; a crop from a lens's corner lies wholly to one side.
+    // Limit the growth and the size of a camera. If the picture extends beyond the source's own frame on both sides, it
+    // is cropped evenly; the picture of a crop from a lens's corner lies entirely to one side.
     let cap = |low: f64, high: f64, size: f64| {
         let (margin, widest) = (0.5 * (MAX_GROWTH - 1.0) * size, MAX_GROWTH * size);
         let start = (-margin).clamp(low, (high - widest).max(low));
@@ -63,7 +63,7 @@ pub fn source_pixels(pinhole: &Camera, source: &Camera) -> Vec<[f32; 2]> {
         let unfolded = &unfolded;
         (0..pinhole.width).map(move |u| {
             let normalized = normalized(u, v);
-            // A polynomial that has folded back lands inside the picture though no light came that way.
+            // Where the polynomial folds back, it can land inside the picture although no light came that way.
             if !unfolded.contains(normalized) {
                 return [f32::NEG_INFINITY; 2];
             }
@@ -73,7 +73,7 @@ pub fn source_pixels(pinhole: &Camera, source: &Camera) -> Vec<[f32; 2]> {
     (0..pinhole.height).into_par_iter().flat_map_iter(row).collect()
 }
 
-/// The four pixels around a position, edges repeated, and how far it lies between them.
+/// The four pixels around a position, edges repeated, and its fractional offsets between them.
 pub struct Taps {
     /// Row-order indices: top left, top right, bottom left, bottom right.
     pub index: [usize; 4],
@@ -82,7 +82,7 @@ pub struct Taps {
 }
 
 impl Taps {
-    /// Pixel centres lie at (u + 0.5, v + 0.5).
+    /// The taps of a position; pixel centres lie at (u + 0.5, v + 0.5).
     pub fn new([x, y]: [f32; 2], width: u32, height: u32) -> Self {
         let (x, y) = (x - 0.5, y - 0.5);
         let clamp = |v: f32, n: u32| v.clamp(0.0, (n - 1) as f32) as usize;
@@ -92,20 +92,20 @@ impl Taps {
         Self { index: [v0 + u0, v0 + u1, v1 + u0, v1 + u1], across: x - u, down: y - v }
     }
 
-    /// Shares of the four pixels, in the order of `index`; their sum is 1.
+    /// Weights of the four pixels, in the order of `index`; their sum is 1.
     pub fn weights(&self) -> [f32; 4] {
         let (x, y) = (self.across, self.down);
         [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y]
     }
 
-    /// Between four values in the order of `index`.
+    /// Bilinear interpolation of four values in the order of `index`.
     pub fn blend(&self, [a, b, c, d]: [f32; 4]) -> f32 {
         let top = a + (b - a) * self.across;
         let bottom = c + (d - c) * self.across;
         top + (bottom - top) * self.down
     }
 
-    /// Row-order index of the pixel that the position lies in.
+    /// Row-order index of the pixel that contains the position.
     pub fn nearest(&self) -> usize {
         self.index[usize::from(self.across >= 0.5) + 2 * usize::from(self.down >= 0.5)]
     }

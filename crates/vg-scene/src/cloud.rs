@@ -1,11 +1,11 @@
-//! Points measured on the vehicle, besides the photographs: a LiDAR sweep, a scan, triangulated features.
+//! Points measured on the vehicle, in addition to the photographs: a LiDAR sweep, a scan, triangulated features.
 
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 use vg_geometry::Similarity;
 use vg_geometry::{Error, Result};
 
-/// Most points of a cloud.
+/// Maximum of points of a cloud.
 pub const MAX_CLOUD_POINTS: usize = 10_000_000;
 
 /// Points in the vehicle frame, metres, in any order, all finite. Some may be wrong or show something else.
@@ -14,13 +14,13 @@ pub const MAX_CLOUD_POINTS: usize = 10_000_000;
 pub struct Cloud(Arc<[[f32; 3]]>);
 
 impl Cloud {
-    /// From at least one point and at most [`MAX_CLOUD_POINTS`].
+    /// A cloud of 1 to [`MAX_CLOUD_POINTS`] points.
     pub fn new(points: Vec<[f32; 3]>) -> Result<Self> {
         Self::check("cloud", &points)?;
         Ok(Self(points.into()))
     }
 
-    /// Whether points can be a cloud; `argument` names them in the error.
+    /// Checks the number of points and that all are finite; `argument` names them in the error.
     pub fn check(argument: &str, points: &[[f32; 3]]) -> Result<()> {
         if points.is_empty() || points.len() > MAX_CLOUD_POINTS {
             let allowed = format!("1 to {MAX_CLOUD_POINTS} points");
@@ -33,18 +33,18 @@ impl Cloud {
         Ok(())
     }
 
-    /// Vehicle frame, metres. `[n][3]`
+    /// The points, vehicle frame, metres. `[n][3]`
     pub fn points(&self) -> &[[f32; 3]] {
         &self.0
     }
 
-    /// The same points in a frame that lies at `vehicle_from_frame`, a rigid motion, in theirs.
+    /// The points in the frame whose pose in the vehicle frame is `vehicle_from_frame`, a rigid motion.
     pub fn in_frame(&self, vehicle_from_frame: &Similarity) -> Self {
         let back = vehicle_from_frame.rotation.transpose();
         let largest = DVec3::splat(f64::from(f32::MAX));
         let point = |p: &[f32; 3]| {
             let p = back * (Vec3::from_array(*p).as_dvec3() - vehicle_from_frame.translation);
-            // A turn can take the largest number beyond itself.
+            // A rotation can take the largest numbers beyond the range of f32.
             p.clamp(-largest, largest).as_vec3().to_array()
         };
         Self(self.0.iter().map(point).collect())
@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cloud_is_neither_empty_nor_endless_nor_without_number() {
+    fn empty_too_large_and_non_finite_clouds_are_refused() {
         let error = |points| Cloud::new(points).unwrap_err().to_string();
         assert!(error(vec![]).contains("0 points"));
         assert!(error(vec![[0.0; 3], [0.0, f32::NAN, 0.0]]).contains("cloud[1]"));

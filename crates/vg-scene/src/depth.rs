@@ -16,12 +16,12 @@ pub struct DepthMap {
     confidence: Option<Arc<[f32]>>,
 }
 
-/// Depths beyond this are taken for no measurement, like NaN, infinity and values <= 0.
+/// Largest measured depth; larger values count as no measurement, like NaN, infinity and values <= 0.
 pub const MAX_DEPTH_M: f32 = 1e5;
 
 impl DepthMap {
-    /// From depths in row order; whatever is not a measurement (NaN, infinite, <= 0, beyond [`MAX_DEPTH_M`])
-    /// becomes 0 = none. `depth.len()` must be `width * height`.
+    /// A depth map from depths in row order; values that are not measurements (NaN, infinite, <= 0, beyond
+    /// [`MAX_DEPTH_M`]) become 0 = none. `depth.len()` must be `width * height`.
     pub fn new(width: u32, height: u32, depth: Vec<f32>) -> Result<Self> {
         check_len("depth", width, height, depth.len())?;
         let depth = depth.into_iter().map(measured).collect();
@@ -42,14 +42,14 @@ impl DepthMap {
         Ok(Self { width, height, depth: depth.into(), confidence: None })
     }
 
-    /// The same with a confidence in [0, 1] per pixel.
+    /// This depth map with a confidence in [0, 1] per pixel.
     pub fn with_confidence(mut self, confidence: Vec<f32>) -> Result<Self> {
         check_len("confidence", self.width, self.height, confidence.len())?;
         self.confidence = Some(confidence.into());
         Ok(self)
     }
 
-    /// The same with no measurement where `keep` says no of a pixel's index in row order.
+    /// This depth map without the measurements for which `keep` (of a pixel's index in row order) is false.
     pub fn where_kept(&self, keep: impl Fn(usize) -> bool) -> Self {
         let kept = |(i, &d): (usize, &f32)| if keep(i) { d } else { 0.0 };
         Self { depth: self.depth.iter().enumerate().map(kept).collect(), ..self.clone() }
@@ -65,17 +65,17 @@ impl DepthMap {
         self.height
     }
 
-    /// Planar z in metres in row order, 0 where there is none. `[height * width]`
+    /// Planar z in metres in row order, 0 without a measurement. `[height * width]`
     pub fn depth(&self) -> &[f32] {
         &self.depth
     }
 
-    /// Confidence in [0, 1] in row order, where the source gives one. `[height * width]`
+    /// Confidence in [0, 1] in row order, if the source provides it. `[height * width]`
     pub fn confidence(&self) -> Option<&[f32]> {
         self.confidence.as_deref()
     }
 
-    /// Depth in column u, row v, or `None` where there is none.
+    /// Depth in column u, row v, or `None` without a measurement.
     pub fn get(&self, u: u32, v: u32) -> Option<f32> {
         let d = self.depth[v as usize * self.width as usize + u as usize];
         (d > 0.0).then_some(d)
@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_measurement_is_stored_as_none() {
+    fn values_that_are_no_measurement_are_stored_as_none() {
         let d = DepthMap::new(6, 1, vec![f32::NAN, f32::INFINITY, -1.0, 0.0, 1e9, 2.5]).unwrap();
         assert_eq!(d.depth(), [0.0, 0.0, 0.0, 0.0, 0.0, 2.5]);
         assert_eq!(d.get(0, 0), None);

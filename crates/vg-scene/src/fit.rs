@@ -1,4 +1,4 @@
-//! Photographs at the network's size, with intrinsics that follow exactly, and the way back to full resolution.
+//! Resampling of photographs to the network's size, with exact intrinsics, and of its outputs back to full resolution.
 
 use super::framing::{Framing, Resize};
 use super::undistort::depth_at;
@@ -10,28 +10,28 @@ use vg_geometry::Intrinsics;
 use vg_geometry::Result;
 use vg_geometry::resample::Taps;
 
-/// How a photograph lies in the network's picture: u' = scale u - offset, both ways alike in v; pixels whose first
-/// centre is (0.5, 0.5).
+/// Mapping from a photograph to the network's picture: u' = scale u - offset, and v' in the same way, in pixels whose
+/// first centre is (0.5, 0.5).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// Of the network's picture.
+    /// Width and height of the network's picture.
     pub size: (u32, u32),
     scale: [f64; 2],
     offset: [u32; 2],
-    /// Of the photograph before anything is cut.
+    /// Width and height of the scaled photograph before it is cropped.
     resized: (u32, u32),
 }
 
 impl Fit {
-    /// A photograph of `width` x `height` in a picture of `size`; `None` if next to all of it would be cut.
+    /// The mapping of a photograph of `width` x `height` to a picture of `size`; `None` if nearly all would be cropped.
     pub fn new(width: u32, height: u32, size: (u32, u32), resize: Resize) -> Option<Self> {
-        /// Scaled photographs may be so many times the network's picture.
+        /// Maximum area of the scaled photograph over that of the network's picture.
         const MOST: u64 = 16;
         let (w, h) = (f64::from(width), f64::from(height));
         let resized = match resize {
             Resize::Stretch => size,
             Resize::CoverCrop => {
-                // What the released networks were trained with; the least more keeps the floor from losing a pixel.
+                // As in the training of the released networks; 1e-8 keeps the floor from losing a pixel.
                 let a = (f64::from(size.0) / w).max(f64::from(size.1) / h) + 1e-8;
                 (((w * a) as u32).max(size.0), ((h * a) as u32).max(size.1))
             }
@@ -43,20 +43,20 @@ impl Fit {
         let middle = |all: u32, kept: u32| (0.5 * f64::from(all - kept)).round_ties_even() as u32;
         Some(Self {
             size,
-            // Of the pictures as they are, rounded to whole pixels.
+            // Exact scale after rounding to whole pixels.
             scale: [f64::from(resized.0) / w, f64::from(resized.1) / h],
             offset: [middle(resized.0, size.0), middle(resized.1, size.1)],
             resized,
         })
     }
 
-    /// The camera of the network's picture.
+    /// Intrinsics of the network's picture.
     pub fn intrinsics(&self, i: &Intrinsics) -> Intrinsics {
         let ([sx, sy], [left, top]) = (self.scale, self.offset.map(f64::from));
         Intrinsics { fx: sx * i.fx, fy: sy * i.fy, cx: sx * i.cx - left, cy: sy * i.cy - top }
     }
 
-    /// Colours as the network takes them. `[3][height][width]`
+    /// Normalised colours of the network's picture. `[3][height][width]`
     pub fn picture(&self, image: &RgbImage, framing: &Framing) -> Vec<f32> {
         let (width, height) = (image.width(), image.height());
         let bytes = image.pixels().as_flattened().to_vec();
@@ -79,18 +79,18 @@ impl Fit {
         out
     }
 
-    /// Depth of the network's picture at the photograph's pixels; 0 where the network did not see them.
+    /// Depth of the network's picture at the photograph's pixels; 0 for pixels that were cropped.
     pub fn back(&self, depth: &DepthMap, width: u32, height: u32) -> Result<DepthMap> {
         let at = |pixel: usize| self.taps(pixel, width).map_or(0.0, |taps| depth_at(depth, &taps));
         DepthMap::new(width, height, (0..width as usize * height as usize).map(at).collect())
     }
 
-    /// Index of the network's pixel in which the centre of the photograph's lies.
+    /// Index of the network's pixel that contains the centre of a photograph's pixel; `None` if it was cropped.
     pub fn nearest(&self, pixel: usize, width: u32) -> Option<usize> {
         self.taps(pixel, width).map(|taps| taps.nearest())
     }
 
-    /// Where the centre of a photograph's pixel lies in the network's picture, if it does.
+    /// Position of the centre of a photograph's pixel in the network's picture; `None` if it was cropped.
     pub fn taps(&self, pixel: usize, width: u32) -> Option<Taps> {
         let ([sx, sy], [left, top]) = (self.scale, self.offset.map(f64::from));
         let u = sx * (f64::from(pixel as u32 % width) + 0.5) - left;
@@ -135,7 +135,7 @@ mod tests {
             let expected = 1.0 + 0.001 * (2.0 * (u as f32 - 1.0) + 0.5);
             assert!((back.get(u, 2).unwrap() - expected).abs() < 1e-5);
         }
-        // In the middle of four pixels, the last of them is nearest.
+        // In the middle of four pixels, the last of them counts as nearest.
         assert_eq!((fit.nearest(0, 8), fit.nearest(1, 8)), (None, Some(13)));
     }
 }

@@ -1,14 +1,14 @@
-//! What pictures a network takes: their size, how photographs come to it, and the scale of colours. Read off its
-//! ports and metadata (docs/ONNX.md).
+//! Input pictures of a network: their size, the resampling of photographs, and the normalisation of colours. Read from
+//! its ports and metadata (docs/ONNX.md).
 
 use crate::onnx::{Broken, Ports};
 
-/// How a photograph comes to the network's size.
+/// Method of resampling a photograph to the network's size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Resize {
-    /// Scaled evenly to cover it; what is over is cut on both sides.
+    /// Scaled uniformly to cover the picture; the excess is cropped on both sides.
     CoverCrop,
-    /// Width and height each to its own.
+    /// Width and height scaled independently.
     Stretch,
 }
 
@@ -16,23 +16,24 @@ pub enum Resize {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Size {
     Fixed(u32, u32),
-    /// The long side, and what both sides are multiples of.
+    /// Long side, and the number of which both sides are multiples.
     Free {
         long_side: u32,
         multiple: u32,
     },
 }
 
-/// The pictures that a network takes.
+/// Format of a network's input pictures.
 #[derive(Clone, Copy, Debug)]
 pub struct Framing {
     /// How pictures are brought to the size.
     pub resize: Resize,
     size: Size,
-    /// Taken off the colours in [0, 1], which are then divided by `std`.
+    /// Mean that is subtracted from colours in [0, 1].
     pub(crate) mean: [f32; 3],
+    /// Divisor of the colours after the subtraction.
     pub(crate) std: [f32; 3],
-    /// How many views it takes at once, where that is fixed.
+    /// The number of views per run, if it is fixed.
     pub views: Option<usize>,
 }
 
@@ -40,10 +41,10 @@ pub struct Framing {
 const LONG_SIDE: u32 = 518;
 
 impl Framing {
-    /// From the input `images` and the metadata; `resize` where the model says nothing of it.
+    /// Reads the format from the input `images` and the metadata; `resize` is the default method.
     pub fn read(ports: &Ports, resize: Resize) -> Result<Self, Broken> {
-        let ways = [("cover_crop", Resize::CoverCrop), ("stretch", Resize::Stretch)];
-        let resize = ports.one_of("vg.resize", &ways, Some(resize))?;
+        let methods = [("cover_crop", Resize::CoverCrop), ("stretch", Resize::Stretch)];
+        let resize = ports.one_of("vg.resize", &methods, Some(resize))?;
         let multiple = ports.count("vg.size_multiple", 1)?;
         let long_side = ports.count("vg.long_side", LONG_SIDE)?;
         let mean = ports.color("vg.mean", [0.0; 3])?;
@@ -56,12 +57,12 @@ impl Framing {
             (Some(height), Some(width)) => {
                 let side = |n: usize| u32::try_from(n).ok().filter(|n| (1..=8192).contains(n));
                 let sides = side(width).zip(side(height));
-                let (width, height) =
-                    sides.ok_or_else(|| Broken::new("input images", "sides beyond 1 to 8192"))?;
+                let (width, height) = sides
+                    .ok_or_else(|| Broken::new("input images", "a side out of range; allowed: 1 to 8192"))?;
                 Size::Fixed(width, height)
             }
             (None, None) if long_side < multiple => {
-                let reason = format!("{long_side}, less than vg.size_multiple {multiple}");
+                let reason = format!("{long_side}; allowed: at least vg.size_multiple, {multiple}");
                 return Err(Broken::new("metadata vg.long_side", reason));
             }
             (None, None) => Size::Free { long_side, multiple },
@@ -75,7 +76,7 @@ impl Framing {
         Ok(Self { resize, size, mean, std, views: images[0] })
     }
 
-    /// Width and height for photographs of `aspect` = width / height on the mean.
+    /// Width and height of the network's picture for photographs of mean `aspect` = width / height.
     pub fn size_for(&self, aspect: f64) -> (u32, u32) {
         match self.size {
             Size::Fixed(width, height) => (width, height),

@@ -1,4 +1,4 @@
-//! 8-bit colour pictures, sRGB-encoded as cameras write them, row 0 at the top.
+//! 8-bit colour pictures, sRGB-encoded as written by cameras, row 0 at the top.
 
 use bytes::Bytes;
 use vg_geometry::{Error, Result};
@@ -29,7 +29,7 @@ impl PixelFormat {
     }
 }
 
-/// An RGB picture, rows without gaps. Clones share the pixels, which nobody changes.
+/// An RGB picture, rows without gaps. Clones share the pixels, which are immutable.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RgbImage {
     width: u32,
@@ -39,15 +39,15 @@ pub struct RgbImage {
 }
 
 impl RgbImage {
-    /// From pixels in row order; `pixels.len()` must be `width * height`.
+    /// A picture from pixels in row order; `pixels.len()` must be `width * height`.
     pub fn new(width: u32, height: u32, pixels: Vec<[u8; 3]>) -> Result<Self> {
         check_len("image", width, height, pixels.len())?;
         Ok(Self { width, height, bytes: pixels.into_flattened().into() })
     }
 
-    /// Borrows the pixels where they are: R, G, B in row order without gaps, `width * height * 3` bytes. `owner` keeps
-    /// them, and is dropped with the last clone of the picture (on an error, before this returns). For as long, its
-    /// bytes may not change.
+    /// Borrows the pixels in place: R, G, B in row order without gaps, `width * height * 3` bytes. `owner` holds
+    /// them and is dropped with the last clone of the picture (on an error, before this returns). Until then its
+    /// bytes must not change.
     pub fn from_owner(
         argument: &str,
         width: u32,
@@ -156,7 +156,7 @@ mod tests {
         assert_eq!(image.pixels(), [[3, 2, 1], [6, 5, 4], [9, 8, 7], [12, 11, 10]]);
     }
 
-    /// Tells by its drop when a picture has let go of its pixels.
+    /// Pixels that report when they are dropped.
     struct Lent {
         bytes: Vec<u8>,
         released: std::sync::mpsc::Sender<()>,

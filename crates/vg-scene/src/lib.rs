@@ -1,4 +1,4 @@
-//! What a reconstruction starts from: views, each an image, a mask, a camera, and depth where it was measured.
+//! Input of a reconstruction: views, each with an image, a mask, a camera, and depth if it was measured.
 
 #![warn(unreachable_pub)]
 

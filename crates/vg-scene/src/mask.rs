@@ -1,19 +1,19 @@
-//! Which pixels show the vehicle.
+//! Masks: the pixels that show the vehicle.
 
 use super::image::{check_len, strided_rows};
 use std::sync::Arc;
 use vg_geometry::{Error, Result};
 
-/// Mask values at or above this are vehicle.
+/// Lowest mask value of vehicle pixels.
 pub const VEHICLE_THRESHOLD: u8 = 128;
 
-/// What is known of a pixel.
+/// Label of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Label {
-    /// Not vehicle: the ray of this pixel passes the vehicle by.
+    /// Not vehicle: the ray of this pixel misses the vehicle.
     Background = 0,
-    /// No statement, for example outside the lens after undistortion.
+    /// Unknown, for example outside the lens after undistortion.
     Unknown = 1,
     /// Vehicle.
     Vehicle = 255,
@@ -29,17 +29,17 @@ pub struct Mask {
 }
 
 impl Mask {
-    /// From labels in row order; `labels.len()` must be `width * height`.
+    /// A mask from labels in row order; `labels.len()` must be `width * height`.
     pub fn new(width: u32, height: u32, labels: Vec<Label>) -> Result<Self> {
         check_len("mask", width, height, labels.len())?;
         Ok(Self { width, height, labels: labels.into() })
     }
 
     /// Copies from the caller's 8-bit buffer, whose rows start `row_stride` bytes apart; values of
-    /// [`VEHICLE_THRESHOLD`] and above are vehicle. Where no value is above 1 it is a mask of 0 and 1, and 1 is.
+    /// [`VEHICLE_THRESHOLD`] and above are vehicle. If no value is above 1, the values are 0 and 1, and 1 is vehicle.
     ///
     /// # Errors
-    /// A largest value between: such a mask was written by another rule, and by this one it would be empty.
+    /// A largest value between: such a mask follows another convention and would be read as empty.
     pub fn from_strided(
         argument: &str,
         data: &[u8],
@@ -51,12 +51,13 @@ impl Mask {
         let largest = rows.clone().filter_map(|row| row.iter().copied().max()).max().unwrap_or(0);
         let threshold = if largest == 1 { 1 } else { VEHICLE_THRESHOLD };
         if (2..VEHICLE_THRESHOLD).contains(&largest) {
-            let allowed =
-                format!("0 and 255, where {VEHICLE_THRESHOLD} and above is vehicle, or 0 and 1, where 1 is");
+            let allowed = format!(
+                "0 and 255, where {VEHICLE_THRESHOLD} and above is vehicle, or 0 and 1, where 1 is vehicle"
+            );
             return Err(Error::argument(argument, format!("largest value {largest}"), allowed));
         }
         let label = |&value: &u8| if value >= threshold { Label::Vehicle } else { Label::Background };
-        // Row by row: an iterator over all pixels would not know its length, and is many times slower.
+        // Row by row: an iterator over all pixels has no known length and is many times slower.
         let mut labels = Vec::with_capacity(width as usize * height as usize);
         rows.for_each(|row| labels.extend(row.iter().map(label)));
         Ok(Self { width, height, labels: labels.into() })
@@ -82,12 +83,12 @@ impl Mask {
         self.labels[v as usize * self.width as usize + u as usize] == Label::Vehicle
     }
 
-    /// How many pixels are vehicle.
+    /// The number of vehicle pixels.
     pub fn vehicle_pixels(&self) -> usize {
         self.labels.iter().filter(|&&l| l == Label::Vehicle).count()
     }
 
-    /// First and last column and row with vehicle, inclusive: `[u0, v0, u1, v1]`, or `None` when empty.
+    /// First and last column and row with vehicle pixels, inclusive: `[u0, v0, u1, v1]`, or `None` if there are none.
     pub fn bounds(&self) -> Option<[u32; 4]> {
         let mut bounds: Option<[u32; 4]> = None;
         for (i, _) in self.labels.iter().enumerate().filter(|(_, l)| **l == Label::Vehicle) {

@@ -1,4 +1,4 @@
-//! A view's mirror image across y = 0: what a camera on the other side would see of a symmetric vehicle.
+//! A view's mirror image across y = 0: the view of a symmetric vehicle by a camera on the other side.
 
 use super::mask::Mask;
 use super::{DepthMap, RgbImage, View};
@@ -10,7 +10,7 @@ pub fn mirrored(view: &View) -> View {
     debug_assert!(camera.distortion.is_none());
     let i = camera.intrinsics;
     let (width, height) = (camera.width, camera.height);
-    let whole = "as many pixels as before";
+    let whole = "flipping keeps the number of pixels";
     View {
         name: format!("{} (mirrored)", view.name),
         camera: Camera {
@@ -30,7 +30,7 @@ pub fn mirrored(view: &View) -> View {
     }
 }
 
-/// Each row from right to left.
+/// The pixels with each row reversed.
 fn flipped<T: Copy>(pixels: &[T], width: u32) -> Vec<T> {
     pixels.chunks_exact(width as usize).flat_map(|row| row.iter().rev().copied()).collect()
 }

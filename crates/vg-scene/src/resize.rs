@@ -1,8 +1,7 @@
-//! Views at a lower resolution: coarser pixels of the same pictures.
+//! Downsampling of views.
 //!
-//! Colour is averaged over each new pixel's area. A silhouette stays a silhouette: a new pixel is what at least half
-//! of its area was. Depth is sampled as [`undistort`](super::undistort) samples it, exact on planes and never between
-//! two surfaces.
+//! Colour is averaged over each new pixel's area. A new pixel of the mask has the label of at least half of its area.
+//! Depth is sampled as in [`undistort`](super::undistort), exactly on planes and never between two surfaces.
 
 use super::mask::{Label, Mask};
 use super::undistort::depth_at;
@@ -11,8 +10,8 @@ use rayon::prelude::*;
 use vg_geometry::Result;
 use vg_geometry::resample::Taps;
 
-/// The view at `share` of its width and height, rounded, at least 1 x 1; at 1 the same, sharing its pixels. Lenses
-/// are in normalised coordinates and stay as they are.
+/// The view at `share` of its width and height, rounded, at least 1 x 1; at 1 the view itself, sharing its pixels.
+/// Distortion is defined in normalised coordinates and does not change.
 pub fn resized(view: &View, share: f64) -> Result<View> {
     let side = |pixels: u32| ((f64::from(pixels) * share).round() as u32).clamp(1, pixels);
     let (width, height) = (side(view.camera.width), side(view.camera.height));
@@ -39,11 +38,11 @@ pub fn resized(view: &View, share: f64) -> Result<View> {
 /// The old pixels that a new one covers along an axis.
 struct Span {
     first: usize,
-    /// How much of each; their sum is 1.
+    /// Weight of each pixel; the sum is 1.
     shares: Vec<f32>,
 }
 
-/// One for each of `new` pixels that together cover `old` ones.
+/// One span for each of `new` pixels that together cover `old` ones.
 fn spans(old: u32, new: u32) -> Vec<Span> {
     let length = f64::from(old) / f64::from(new);
     (0..new)
@@ -57,7 +56,7 @@ fn spans(old: u32, new: u32) -> Vec<Span> {
         .collect()
 }
 
-/// What new pixels cover of a picture.
+/// The areas of a picture that new pixels cover.
 struct Area<'a> {
     columns: &'a [Span],
     rows: &'a [Span],
@@ -65,7 +64,7 @@ struct Area<'a> {
 }
 
 impl Area<'_> {
-    /// `each(index of an old pixel, its share)` for all that a new pixel covers.
+    /// Calls `each(index of an old pixel, its share)` for all old pixels that a new pixel covers.
     fn visit(&self, row: &Span, column: &Span, mut each: impl FnMut(usize, f32)) {
         for (v, down) in row.shares.iter().enumerate() {
             let start = (row.first + v) * self.stride + column.first;
@@ -90,7 +89,7 @@ impl Area<'_> {
     }
 
     fn labels(&self, labels: &[Label]) -> Vec<Label> {
-        // Halves are sums of shares: one that is rounded down is a half still.
+        // Tolerance for the rounding of sums of shares that are exactly one half.
         const HALF: f32 = 0.5 - 1e-4;
         self.map(|row, column| {
             let (mut vehicle, mut background) = (0.0f32, 0.0f32);
@@ -180,7 +179,7 @@ mod tests {
                 let at_edge = !(1..small.camera.width - 1).contains(&u)
                     || !(1..small.camera.height - 1).contains(&v)
                     || (0..9).any(|k| depth.get(u + k % 3 - 1, v + k / 3 - 1).is_none());
-                // Beside the edge the nearest pixel speaks, up to half an old pixel away.
+                // At the edge, depth is that of the nearest pixel, up to half an old pixel away.
                 let tolerance = if at_edge { 0.02 } else { 1e-5 };
                 assert!((f64::from(z) - true_z).abs() < tolerance, "{share} ({u}, {v}): {z} {true_z}");
                 measured += 1;
@@ -203,7 +202,7 @@ mod tests {
     #[test]
     fn colour_is_the_mean_over_the_new_pixels_area() {
         let small = resized(&view(), 0.25).unwrap();
-        // Columns 4u to 4u + 3 of the ramp, rows likewise below 90 / 22.5.
+        // Columns 4u to 4u + 3 of the ramp; each new row covers about four rows.
         assert!(
             small.image.pixels()[..30]
                 .iter()
@@ -213,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_left_of_no_picture_but_one_pixel_and_nothing_is_copied_at_1() {
+    fn the_smallest_picture_has_one_pixel_and_a_share_of_1_copies_nothing() {
         let view = view();
         let dot = resized(&view, 1e-9).unwrap();
         assert_eq!((dot.camera.width, dot.camera.height), (1, 1));
@@ -223,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_mostly_unknown_stays_unknown() {
+    fn pixels_that_are_mostly_unknown_stay_unknown() {
         let mut view = view();
         view.mask = Some(Mask::new(WIDTH, HEIGHT, vec![Label::Unknown; 10800]).unwrap());
         let small = resized(&view, 0.4).unwrap();

@@ -1,15 +1,15 @@
-//! Views of distorted cameras resampled onto a pinhole that holds all they saw.
+//! Resampling of views of distorted cameras onto a pinhole camera that covers the whole picture.
 //!
-//! Kernels know pinholes only. Pictures and silhouettes are resampled bilinearly; depth likewise within one
-//! surface, by the nearest pixel elsewhere (an edge between two depths is not a surface). Pinhole pixels that the
-//! lens did not see are labelled unknown, so that nobody takes them for background.
+//! Kernels support pinholes only. Pictures and silhouettes are resampled bilinearly. Depth is resampled bilinearly
+//! within one surface and by the nearest pixel elsewhere (an edge between two depths is not a surface). Pinhole pixels
+//! that the lens did not see are labelled unknown, so that they do not count as background.
 
 use super::mask::{Label, Mask};
 use super::{DepthMap, RgbImage, View};
 use vg_geometry::resample::{Taps, pinhole_for, source_pixels};
 use vg_geometry::{Camera, Distortion, Result};
 
-/// The view on a pinhole grid; a pinhole view is returned as it is, sharing its pixels.
+/// The view on a pinhole grid; a pinhole view is returned unchanged, sharing its pixels.
 pub fn undistorted(view: &View) -> Result<View> {
     if view.camera.distortion.is_none() {
         let camera = Camera { distortion: Distortion::None, ..view.camera };
@@ -53,7 +53,7 @@ pub(crate) fn bilinear(image: &RgbImage, position: [f32; 2]) -> [u8; 3] {
     std::array::from_fn(|k| taps.blend(colors.map(|c| f32::from(c[k]))).round() as u8)
 }
 
-/// Vehicle where the bilinear share of vehicle is at least half; unknown beside an unknown pixel.
+/// Vehicle if the bilinear share of vehicle is at least half; next to an unknown pixel, the nearest pixel's label.
 fn label_at(mask: &Mask, taps: &Taps) -> Label {
     let labels = taps.index.map(|i| mask.labels()[i]);
     if labels.contains(&Label::Unknown) {
@@ -63,10 +63,10 @@ fn label_at(mask: &Mask, taps: &Taps) -> Label {
     if share >= 0.5 { Label::Vehicle } else { Label::Background }
 }
 
-/// Depth in metres, 0 for none: bilinear in inverse depth (linear on a plane) where all four pixels lie on the
-/// surface of the nearest one, else that pixel's own.
+/// Depth in metres, 0 for none: bilinear in inverse depth (linear on a plane) if all four pixels lie on the
+/// surface of the nearest one, else the depth of that pixel.
 pub(crate) fn depth_at(depth: &DepthMap, taps: &Taps) -> f32 {
-    /// Neighbours on one surface differ by less, relatively.
+    /// Largest relative difference of neighbours on one surface.
     const SAME_SURFACE: f32 = 0.02;
     let nearest = depth.depth()[taps.nearest()];
     let around = taps.index.map(|i| depth.depth()[i]);

@@ -1,10 +1,10 @@
-//! The vehicle's box as a tracker, an annotator or a data sheet tells it: its size, and where it stands.
+//! The vehicle's box from a tracker, an annotator or a data sheet: its size and place.
 
 use glam::{DMat3, DVec3};
 use vg_geometry::{Error, Result};
 use vg_geometry::{Pose, Similarity};
 
-/// Sides of road vehicles and of their models, metres.
+/// Allowed sides of road vehicles and of scale models, metres.
 const SIDE_M: std::ops::RangeInclusive<f64> = 0.1..=30.0;
 
 /// Size and place of a vehicle's box.
@@ -12,21 +12,22 @@ const SIDE_M: std::ops::RangeInclusive<f64> = 0.1..=30.0;
 pub struct VehicleBox {
     /// Length, width, height, metres.
     pub size: [f64; 3],
-    /// Where it stands; `None` where only the size is known.
+    /// Place of the box; `None` if only the size is known.
     pub place: Option<Place>,
 }
 
-/// Where a box stands in the frame of the cameras, level.
+/// Place of a level box in the frame of the cameras.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Place {
-    /// Its centre, metres.
+    /// Centre of the box, metres.
     pub center: [f64; 3],
-    /// From the frame's x axis to the vehicle's, about z, anticlockwise from above, radians.
+    /// Angle from the frame's x axis to the vehicle's, about z, anticlockwise from above, radians.
     pub yaw: f64,
 }
 
 impl VehicleBox {
-    /// Sides of a road vehicle, a finite centre, a yaw of at most one turn. `argument` names the box in the error.
+    /// Checks that the sides are those of a road vehicle, the centre is finite, and the yaw is at most one turn.
+    /// `argument` names the box in the error.
     pub fn validate(&self, argument: &str) -> Result<()> {
         if !self.size.iter().all(|side| SIDE_M.contains(side)) {
             return Err(Error::argument(
@@ -41,16 +42,16 @@ impl VehicleBox {
     /// The box in another frame. `argument` names the box in the error.
     ///
     /// # Errors
-    /// [`Error::Argument`] where a box that stood level would lean.
+    /// [`Error::Argument`] if the box would not be level in the other frame.
     pub fn moved(&self, argument: &str, to_from: &Similarity) -> Result<Self> {
-        /// A box leans by less than this if it is to count as level: 2 degrees.
+        /// 1 - cosine of the largest tilt of a level box, 2 degrees.
         const LEVEL: f64 = 6e-4;
         let size = self.size.map(|side| side * to_from.scale);
         let Some(place) = self.place else { return Ok(Self { size, place: None }) };
         let up = to_from.rotation.z_axis;
         if up.z < 1.0 - LEVEL {
-            let found = format!("a box whose upright axis becomes {:.3}, {:.3}, {:.3}", up.x, up.y, up.z);
-            let allowed = "a box in a frame whose z axis is up, as in the frame that it is moved to";
+            let found = format!("a box whose up axis becomes {:.3}, {:.3}, {:.3}", up.x, up.y, up.z);
+            let allowed = "a box in a frame whose z axis points up, as in the frame that it is moved to";
             return Err(Error::argument(argument, found, allowed));
         }
         let forward = to_from.rotation * DVec3::new(place.yaw.cos(), place.yaw.sin(), 0.0);
@@ -59,7 +60,7 @@ impl VehicleBox {
     }
 }
 
-/// The options spell size and place as two fields of their own.
+/// Name of the size in errors: the options have separate fields for size and place.
 fn size_name(argument: &str) -> String {
     if argument == "options" { "options.vehicle_size".into() } else { format!("{argument}.size") }
 }
@@ -79,12 +80,13 @@ impl Place {
         Ok(())
     }
 
-    /// Whether the box's plane of symmetry is y = 0, up to what no photograph tells: 0.1 mm, a millionth of a radian.
+    /// Whether the box's plane of symmetry is y = 0, to 0.1 mm and a millionth of a radian, which no photograph
+    /// resolves.
     pub fn is_on_the_plane(&self) -> bool {
         self.center[1].abs() < 1e-4 && self.yaw.abs() < 1e-6
     }
 
-    /// Takes points of the box's own frame, x forward, y left, z up about its centre, to the frame of the cameras.
+    /// Pose of the box's own frame (x forward, y left, z up, origin at its centre) in the frame of the cameras.
     pub fn vehicle_from_box(&self) -> Pose {
         Pose { rotation: DMat3::from_rotation_z(self.yaw), translation: DVec3::from_array(self.center) }
     }

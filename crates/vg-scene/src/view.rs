@@ -1,14 +1,14 @@
-//! A view and a scene, and what makes them valid.
+//! Views and scenes, and their validation.
 
 use super::{Cloud, DepthMap, Mask, RgbImage, VehicleBox};
 use glam::{DVec3, Vec3};
 use vg_geometry::Camera;
 use vg_geometry::{Error, Result};
 
-/// Most views a scene may hold.
+/// Maximum of views in a scene.
 pub const MAX_VIEWS: usize = 4096;
 
-/// One photograph: picture, camera, and which pixels show the vehicle. Clones share all that is per pixel.
+/// One photograph: picture, camera and mask. Clones share all per-pixel data.
 #[derive(Clone, Debug)]
 pub struct View {
     /// Name for messages and output files, for example the picture's file name.
@@ -17,25 +17,25 @@ pub struct View {
     pub camera: Camera,
     /// The picture, of the camera's size.
     pub image: RgbImage,
-    /// Vehicle or not, of the camera's size; `None` where nobody said.
+    /// Mask of the vehicle, of the camera's size; `None` if there is none.
     pub mask: Option<Mask>,
     /// Measured planar depth in metres, of the camera's size.
     pub depth: Option<DepthMap>,
 }
 
-/// Views of one vehicle in its own frame, and what else was measured of it.
+/// Views of one vehicle in its own frame, and further measurements of it.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
-    /// In the caller's order.
+    /// Views, in the caller's order.
     pub views: Vec<View>,
-    /// Points on the vehicle, where some were measured; priors that estimate the surface move it there.
+    /// Points measured on the vehicle, if any; priors that estimate the surface move it to these points.
     pub cloud: Option<Cloud>,
-    /// The vehicle's box, where one was tracked or measured; [`crate::pipeline::Options::vehicle_size`] goes before it.
+    /// The vehicle's box, if it was tracked or measured; [`crate::pipeline::Options::vehicle_size`] takes precedence.
     pub vehicle_box: Option<VehicleBox>,
 }
 
 impl View {
-    /// A view for what looks at cameras and masks alone: its picture is black.
+    /// A view with a black picture, for functions that use only cameras and masks.
     pub fn without_picture(name: String, camera: Camera, mask: Option<Mask>) -> Result<Self> {
         camera.validate("camera")?;
         let (width, height) = (camera.width, camera.height);
@@ -43,7 +43,8 @@ impl View {
         Ok(Self { name, camera, image, mask, depth: None })
     }
 
-    /// Camera valid, picture, mask and depth of the camera's size; `argument` names the view in the error.
+    /// Checks that the camera is valid and that picture, mask and depth have its size; `argument` names the view in the
+    /// error.
     pub fn validate(&self, argument: &str) -> Result<()> {
         self.camera.validate(&format!("{argument}.camera"))?;
         let expected = (self.camera.width, self.camera.height);
@@ -67,7 +68,7 @@ impl View {
         Ok(())
     }
 
-    /// The point at planar depth `z` metres behind the centre of pixel (u, v) of a pinhole view, vehicle frame
+    /// The point at planar depth `z` metres on the ray of the centre of pixel (u, v) of a pinhole view, vehicle frame
     /// (paper eqs. `metric_point_ray`, `vehicle_point`).
     pub fn lift(&self, u: u32, v: u32, z: f32) -> Vec3 {
         let pixel = [f64::from(u) + 0.5, f64::from(v) + 0.5];
@@ -76,7 +77,7 @@ impl View {
         self.camera.vehicle_from_camera.transform_point(point_camera).as_vec3()
     }
 
-    /// How errors name view number `index`.
+    /// Name of the view in errors, if its number is `index`.
     pub fn argument(&self, index: usize) -> String {
         if self.name.is_empty() {
             format!("views[{index}]")
@@ -87,7 +88,7 @@ impl View {
 }
 
 impl Scene {
-    /// At least one view, all valid.
+    /// Checks that there is at least one view and that all views are valid.
     pub fn validate(&self) -> Result<()> {
         if self.views.is_empty() || self.views.len() > MAX_VIEWS {
             return Err(Error::argument("views", self.views.len().to_string(), format!("1 to {MAX_VIEWS}")));

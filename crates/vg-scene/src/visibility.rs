@@ -1,17 +1,17 @@
-//! What a view with depth says about a point in space.
+//! Visibility of points in views with depth.
 
 use super::mask::Label;
 use super::{DepthMap, View};
 use glam::{Mat3, Vec3};
 use vg_geometry::Intrinsics;
 
-/// Views of one vehicle agree on a surface to about this, metres.
+/// Approximate agreement of the surfaces of one vehicle's views, metres.
 pub const SURFACE_M: f32 = 0.06;
 
-/// A view's verdict on a point.
+/// Visibility of a point in a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sight {
-    /// The view makes no statement: the point is behind it, outside its picture, hidden, or its pixel unknown.
+    /// Unknown: the point is behind the camera, outside the picture, hidden, or its pixel is unknown.
     Silent,
     /// The view sees the background there.
     Background,
@@ -21,7 +21,7 @@ pub enum Sight {
     Surface,
 }
 
-/// One pinhole view and its depth, ready for look-ups.
+/// One pinhole view and its depth, prepared for look-ups.
 pub struct Observer<'a> {
     view: &'a View,
     depth: &'a DepthMap,
@@ -32,7 +32,7 @@ pub struct Observer<'a> {
 }
 
 impl<'a> Observer<'a> {
-    /// Of an undistorted view.
+    /// The observer of an undistorted view.
     pub fn new(view: &'a View, depth: &'a DepthMap) -> Self {
         let camera_from_vehicle = view.camera.vehicle_from_camera.inverse();
         let Intrinsics { fx, fy, cx, cy } = view.camera.intrinsics;
@@ -48,7 +48,7 @@ impl<'a> Observer<'a> {
         }
     }
 
-    /// What the view says of `point` (vehicle frame), a surface `tolerance` metres thick.
+    /// Visibility of `point` (vehicle frame), for surfaces with a tolerance of `tolerance` metres.
     pub fn sight(&self, point: Vec3, tolerance: f32) -> Sight {
         let p = self.camera_from_vehicle.0 * point + self.camera_from_vehicle.1;
         if p.z <= 0.0 {
@@ -85,8 +85,8 @@ impl<'a> Observer<'a> {
         Vec3::from_array(c.map(|c| f32::from(c) / 255.0))
     }
 
-    /// Pixels per metre on a surface at `point` with unit `normal` (vehicle frame), in the direction in which
-    /// it is foreshortened: the resolution at which this view shows the surface. Negative from behind.
+    /// Resolution of a surface at `point` with unit `normal` (vehicle frame), pixels per metre in the direction in
+    /// which it is foreshortened. Negative from behind.
     pub fn resolution(&self, point: Vec3, normal: Vec3) -> f32 {
         let to_camera = self.center - point;
         let focal = self.intrinsics[0].min(self.intrinsics[1]);

@@ -234,7 +234,7 @@ fn what_is_missing_is_told_once_with_every_name_that_was_tried() {
     assert_eq!(
         small.open().unwrap().notes,
         [
-            "no view has a mask: looked for masks/{a,a.png,a_mask,a.mask}.{png,jpg,jpeg,npy}, and the same in mask/"
+            "no view has a mask; searched for masks/{a,a.png,a_mask,a.mask}.{png,jpg,jpeg,npy}, and the same in mask/"
         ]
     );
     let frame = |name: &str| format!(r#"{{"file_path": "images/{name}.png", "transform_matrix": {POSE}}}"#);
@@ -246,13 +246,15 @@ fn what_is_missing_is_told_once_with_every_name_that_was_tried() {
     small.mask("masks/b.png", 4);
     let notes = small.open().unwrap().notes;
     assert_eq!(notes.len(), 1, "{notes:?}");
-    assert!(notes[0].starts_with("a.png, c.png: no mask, though other views have one: looked for masks/{a,"));
+    assert!(
+        notes[0].starts_with("a.png, c.png: no mask, although other views have one; searched for masks/{a,")
+    );
     small.transforms(&format!(
         r#"{{"fl_x": 4, "w": 4, "h": 2, "frames": [{{"file_path": "images/x.v1", "transform_matrix": {POSE}}}]}}"#
     ));
     let error = small.open().unwrap_err().to_string();
     assert!(
-        error.ends_with("images/x.v1: picture: no such file, nor one with .png, .jpg, .jpeg added"),
+        error.ends_with("images/x.v1: picture: no such file, and none with .png, .jpg, .jpeg added"),
         "{error}"
     );
 }
@@ -346,7 +348,7 @@ fn the_largest_of_several_colmap_models_is_taken_and_said() {
     assert_eq!(index.source, dir.path().join("sparse/1"));
     assert_eq!(index.views.len(), 2);
     let note = &index.notes[0];
-    assert!(note.contains("sparse/1: taken of 3 COLMAP models, with 2 images"), "{note}");
+    assert!(note.contains("sparse/1: chosen among 3 COLMAP models, with 2 images"), "{note}");
     assert!(note.contains("sparse/0 has 1") && note.contains("sparse/10 has 1"), "{note}");
     // The one that is named is the one that is read.
     let named = list_scene(&dir.path().join("sparse/10"), &sedan_colmap()).unwrap();

@@ -1,4 +1,4 @@
-//! Where to start: which way is up, where the vehicle is and how large, and all headings.
+//! Initial alignments: directions of up, the vehicle's position and size, and all headings.
 
 use super::scan::{Scan, smallest_axis};
 use super::silhouettes::{Outline, coarse};
@@ -10,22 +10,22 @@ use vg_geometry::Similarity;
 use vg_geometry::progress::Watch;
 use vg_geometry::{Error, Result};
 
-/// Headings tried for each way up: the basin of each is wider than half the step.
+/// Headings tried for each up direction: the basin of each is wider than half the step.
 const HEADINGS: usize = 8;
 
-/// Steps on the support functions.
+/// Maximum of steps on the support functions.
 const STEPS: usize = 25;
 
-/// Views that are asked, at most: they say little that their neighbours do not.
+/// Approximate maximum of views that are compared: neighbouring views are redundant.
 const VIEWS: usize = 16;
 
-/// Losses bend here, pixels: first everything pulls, then what fits.
+/// Residuals from which the loss is linear, pixels: large at first, then small enough to ignore outliers.
 const BENDS_PX: [f64; 2] = [30.0, 4.0];
 
-/// Two starts that end closer than this are one, radians.
+/// Rotations closer than this count as the same result, radians.
 const SAME_TURN: f64 = 0.3;
 
-/// The best coarse alignments, best first, each another way round.
+/// Coarse alignments of different rotations, best first.
 pub(super) fn find(
     outlines: &[Outline],
     scan: &Scan,
@@ -66,7 +66,7 @@ fn turn_between(a: &Similarity, b: &Similarity) -> f64 {
     (0.5 * (r.x_axis.x + r.y_axis.y + r.z_axis.z - 1.0)).clamp(-1.0, 1.0).acos()
 }
 
-/// The same alignment with front and back exchanged, about the middle of the scan.
+/// The alignment with front and back exchanged, about the middle of the scan.
 pub(super) fn turned(s: &Similarity, center: DVec3) -> Similarity {
     let half = DMat3::from_diagonal(DVec3::new(-1.0, -1.0, 1.0));
     Similarity { rotation: half * s.rotation, translation: center + half * (s.translation - center), ..*s }
@@ -81,7 +81,7 @@ pub(super) fn middle(outlines: &[Outline]) -> Result<DVec3> {
         right += across * origin;
     }
     let middle = normal.inverse() * right;
-    // Parallel rays meet nowhere.
+    // Parallel rays have no common point.
     let views = outlines.len() as f64;
     if !middle.is_finite() || normal.determinant() < 1e-6 * views.powi(3) {
         return Err(Error::Reconstruction {
@@ -92,9 +92,9 @@ pub(super) fn middle(outlines: &[Outline]) -> Result<DVec3> {
     Ok(middle)
 }
 
-/// Metres per unit of the world, from how large the scan would look where the vehicle is.
+/// Metres per unit of the world, from the size of the masks and the size that the scan would have in their place.
 fn scale(outlines: &[Outline], scan: &Scan, middle: DVec3) -> Result<f64> {
-    // A convex body's mean width over all directions, seen from all around, is that of its corners.
+    // The mean width of a convex body over all directions follows from the mean distance of its corners.
     let spread =
         scan.corners.iter().map(|p| (*p - scan.center).length()).sum::<f64>() / scan.corners.len() as f64;
     let radii: Vec<f64> = outlines
@@ -105,13 +105,14 @@ fn scale(outlines: &[Outline], scan: &Scan, middle: DVec3) -> Result<f64> {
     if !(scale.is_finite() && scale > 0.0) {
         return Err(Error::Reconstruction {
             stage: "align",
-            reason: "no mask lies whole inside its picture: nothing tells how large the vehicle is".into(),
+            reason: "no mask lies entirely inside its picture, so the vehicle's size cannot be determined"
+                .into(),
         });
     }
     Ok(scale)
 }
 
-/// Ways up to try, world: the ground's normal, what is up in level pictures, and the normal of the cameras' plane.
+/// Up directions to try, world: the ground's normal, up in level pictures, and the normal of the cameras' plane.
 fn ups(outlines: &[Outline], ground: Option<DVec3>) -> Vec<DVec3> {
     let mut ups: Vec<DVec3> = Vec::new();
     let mut offer = |up: DVec3| {
@@ -120,7 +121,7 @@ fn ups(outlines: &[Outline], ground: Option<DVec3>) -> Vec<DVec3> {
         }
     };
     ground.into_iter().for_each(&mut offer);
-    offer(up_of_pictures(outlines));
+    offer(up_from_pictures(outlines));
     if outlines.len() >= 3 {
         let centers: Vec<DVec3> = outlines.iter().map(|o| o.pose().translation).collect();
         let normal = super::scan::plane_of(&centers).1;
@@ -130,8 +131,8 @@ fn ups(outlines: &[Outline], ground: Option<DVec3>) -> Vec<DVec3> {
     ups
 }
 
-/// Level pictures have their x axes in the ground's plane, and their y axes down.
-pub(super) fn up_of_pictures(outlines: &[Outline]) -> DVec3 {
+/// Up direction if the pictures are level: their x axes lie in the ground's plane and their y axes point down.
+pub(super) fn up_from_pictures(outlines: &[Outline]) -> DVec3 {
     let mut matrix = Matrix3::zeros();
     let mut down = DVec3::ZERO;
     for outline in outlines {
@@ -144,7 +145,7 @@ pub(super) fn up_of_pictures(outlines: &[Outline]) -> DVec3 {
     if up.dot(down) > 0.0 { -up } else { up }
 }
 
-/// Takes `up` to z, turned by `heading` about it.
+/// Rotation that takes `up` to z, followed by a turn by `heading` about z.
 pub(super) fn upright(up: DVec3, heading: f64) -> DMat3 {
     let x = up.any_orthonormal_vector();
     DMat3::from_rotation_z(heading) * DMat3::from_cols(x, up.cross(x), up).transpose()

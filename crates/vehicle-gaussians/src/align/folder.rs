@@ -1,4 +1,4 @@
-//! A scene on disk to a scan on disk.
+//! Alignment of a scene on disk to a scan on disk.
 
 use super::{FEWEST_VIEWS, Heading, ScanAlignment, to_scan_watched};
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use vg_geometry::{Error, Result};
 use vg_scene::Cloud;
 use vg_scene::io::{self, MaskedViews};
 
-/// The scan that was named, else the one in the folder of a vehicle of 3DRealCar.
+/// The named scan, or else the one in the folder of a 3DRealCar vehicle.
 pub fn scan_of(folder: &Path, named: Option<&Path>) -> Result<PathBuf> {
     let found = named.map_or_else(|| io::find_scan(folder), |path| Ok(Some(path.to_owned())))?;
     found.ok_or_else(|| {
@@ -17,7 +17,7 @@ pub fn scan_of(folder: &Path, named: Option<&Path>) -> Result<PathBuf> {
     })
 }
 
-/// The masks and sparse points of a scene on disk, of which alignment needs [`FEWEST_VIEWS`].
+/// Reads the masks and sparse points of a scene on disk; an error with fewer than [`FEWEST_VIEWS`] masks.
 pub fn masks_of(folder: &Path) -> Result<MaskedViews> {
     let scene = io::read_masked(folder)?;
     if scene.views.len() < FEWEST_VIEWS {
@@ -31,8 +31,8 @@ pub fn masks_of(folder: &Path) -> Result<MaskedViews> {
     Ok(scene)
 }
 
-/// [`to_scan`](super::to_scan) with the masks, the sparse points and the scan (PLY, metres, vehicle frame) of files; the masks come
-/// with the result. `scan` as in [`scan_of`].
+/// [`to_scan`](super::to_scan) with the masks, the sparse points and the scan (PLY, metres, vehicle frame) read from
+/// files; also returns the masks. `scan` as in [`scan_of`].
 pub fn folder_to_scan(
     folder: &Path,
     scan: Option<&Path>,
@@ -41,7 +41,7 @@ pub fn folder_to_scan(
     folder_to_scan_watched(folder, scan, heading, &UNWATCHED)
 }
 
-/// As [`folder_to_scan`], under `watch`.
+/// [`folder_to_scan`] under `watch`.
 pub fn folder_to_scan_watched(
     folder: &Path,
     scan: Option<&Path>,

@@ -1,16 +1,16 @@
-//! A vehicle's outline from above: the smallest rectangle around it says roughly how it is turned, its own symmetry
-//! exactly.
+//! A vehicle's outline from above: its smallest enclosing rectangle gives an approximate heading, and its symmetry the
+//! exact one.
 
 use glam::DVec2;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// Turns tried for the rectangle. Mirrors and rounded ends let the smallest one turn by some degrees.
+/// The number of rotations tried for the rectangle. Mirrors and rounded ends turn the smallest one by some degrees.
 const TURNS: usize = 90;
 
-/// How far from the rectangle's sides the axis of symmetry is looked for, radians.
+/// Largest angle between the rectangle's sides and the axis of symmetry, radians.
 const WITHIN: f64 = 0.14;
 
-/// Axes tried there; between two, a parabola.
+/// The number of axes tried in that range; a parabola interpolates between them.
 const AXES: usize = 57;
 
 /// Directions in which an axis' two sides are compared.
@@ -20,7 +20,7 @@ const DIRECTIONS: usize = 180;
 pub(super) struct Footprint(Vec<DVec2>);
 
 impl Footprint {
-    /// By Andrew's monotone chain; `points` must not be empty.
+    /// The hull by Andrew's monotone chain; `points` must not be empty.
     pub(super) fn new(mut points: Vec<DVec2>) -> Self {
         points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
         let half = |points: &mut dyn Iterator<Item = DVec2>| {
@@ -40,7 +40,7 @@ impl Footprint {
         Self(corners)
     }
 
-    /// Middle and sides, along axes turned by `turn`, of the rectangle around it.
+    /// Middle and sides, along axes turned by `turn`, of the enclosing rectangle.
     pub(super) fn rectangle(&self, turn: f64) -> (DVec2, DVec2) {
         let reach = |quarters: f64| self.reach(turn + quarters * FRAC_PI_2);
         let high = DVec2::new(reach(0.0), reach(1.0));
@@ -48,14 +48,14 @@ impl Footprint {
         (0.5 * (low + high), high - low)
     }
 
-    /// The turn of the smallest rectangle, below a quarter.
+    /// Rotation of the smallest rectangle, below a quarter turn.
     pub(super) fn smallest_turn(&self) -> f64 {
         let area = |turn: f64| self.rectangle(turn).1.element_product();
         let turns = (0..TURNS).map(|k| k as f64 / TURNS as f64 * FRAC_PI_2);
         turns.min_by(|a, b| area(*a).total_cmp(&area(*b))).unwrap_or(0.0)
     }
 
-    /// The direction near `turn` of the line about which it is most nearly its own mirror image.
+    /// Direction, near `turn`, of the line about which the footprint is most nearly its own mirror image.
     pub(super) fn axis(&self, turn: f64) -> f64 {
         let step = 2.0 * WITHIN / (AXES - 1) as f64;
         let tried: Vec<f64> = (0..AXES).map(|k| turn - WITHIN + k as f64 * step).collect();
@@ -69,8 +69,8 @@ impl Footprint {
         tried[best] + if bend > 0.0 { 0.5 * step * (before - after) / bend } else { 0.0 }
     }
 
-    /// How differently it reaches to both sides of the best line in direction `axis`. A line that lies off the origin
-    /// by k changes the difference by 2 k sin(angle to the axis).
+    /// Sum of squared differences of the support function on both sides of the best line in direction `axis`. A line
+    /// that lies off the origin by k changes the difference by 2 k sin(angle to the axis).
     fn asymmetry(&self, axis: f64) -> f64 {
         let angles = (0..DIRECTIONS).map(|k| (k as f64 + 0.5) / DIRECTIONS as f64 * 0.5 * TAU);
         let differences: Vec<(f64, f64)> =
@@ -80,7 +80,7 @@ impl Footprint {
         differences.iter().map(|(d, s)| (d - k * s).powi(2)).sum()
     }
 
-    /// How far it reaches in a direction: its support function.
+    /// Support function: the largest coordinate along a direction.
     fn reach(&self, angle: f64) -> f64 {
         let direction = DVec2::from_angle(angle);
         self.0.iter().map(|p| p.dot(direction)).fold(f64::NEG_INFINITY, f64::max)
@@ -95,7 +95,7 @@ mod tests {
     fn a_turned_arrow_is_found_with_its_axis_sides_and_middle() {
         let turn = 0.3f64;
         let middle = DVec2::new(5.0, -2.0);
-        // A box with a nose and one more pair of corners, which make the smallest rectangle lie otherwise.
+        // A box with a nose and one more pair of corners, which turn the smallest rectangle.
         let shape = [
             (-2.0, 0.9),
             (-2.0, -0.9),

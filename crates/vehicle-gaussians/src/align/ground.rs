@@ -1,29 +1,29 @@
-//! The ground among the sparse points: the plane most of them lie on, of those that level pictures allow.
+//! The ground among the sparse points: the plane with the most points, among those consistent with level pictures.
 
-use super::candidates::up_of_pictures;
+use super::candidates::up_from_pictures;
 use super::scan::plane_of;
 use super::silhouettes::Outline;
 use glam::DVec3;
 use vg_geometry::robust::scramble;
 
-/// Planes tried: three of half the points lie in one plane once in eight times.
+/// The number of planes tried: if half the points lie in one plane, three random ones do once in eight times.
 const TRIALS: u64 = 400;
 
-/// Cosine of the angle that the ground may have with level pictures.
+/// Cosine of the largest angle between the ground's normal and up in level pictures.
 const LEVEL: f64 = 0.8;
 
-/// Points are on the plane within this part of the cameras' distance from each other.
+/// Largest distance of a point from the plane, as a part of the cameras' largest distance from their middle.
 const THICKNESS: f64 = 0.004;
 
-/// Fewer points are no ground.
+/// Minimum of points on the ground.
 const FEWEST: usize = 50;
 
-/// A point of it and its normal, up, world; `None` where the points show no ground.
+/// A point of the ground and its upward normal, world; `None` if the points show no ground.
 pub(super) fn plane(sparse: &[DVec3], outlines: &[Outline]) -> Option<(DVec3, DVec3)> {
     if sparse.len() < FEWEST {
         return None;
     }
-    let up = up_of_pictures(outlines);
+    let up = up_from_pictures(outlines);
     let middle = outlines.iter().map(|o| o.pose().translation).sum::<DVec3>() / outlines.len() as f64;
     let size = outlines.iter().map(|o| o.pose().translation.distance(middle)).fold(0.0, f64::max);
     let near = |n: DVec3, p: DVec3| {

@@ -1,28 +1,28 @@
-//! Front and back where shape does not tell: a question that a person answers by looking at one photograph.
+//! Front and back if the shape is ambiguous: a person decides by one photograph.
 
 use glam::DVec3;
 use vg_geometry::Similarity;
 use vg_geometry::{Error, Result};
 use vg_scene::View;
 
-/// How front and back are told apart.
+/// Method of distinguishing front and back.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Heading {
-    /// By shape; where that fits as well the other way round, it is an error, which names the view to look at.
+    /// By shape; if the reverse fits equally well, an error that names the view to decide by.
     #[default]
     Auto,
     /// The first view by name, of those not taken from abeam, was taken from ahead of the vehicle's middle.
     Forward,
-    /// It was taken from behind the middle.
+    /// That view was taken from behind the middle.
     Backward,
 }
 
-/// Nearer to abeam than this, ahead and behind are hard to tell in a picture: sine of 17 degrees.
+/// Sine of the smallest angle from abeam (17 degrees) at which ahead and behind are easy to tell in a picture.
 const ABEAM: f64 = 0.3;
 
-/// The view that [`Heading`] speaks of: its name, and whether it was taken from ahead under `s`. Under `s` turned round
-/// it is the same view. `center` is the vehicle's middle, vehicle frame.
-pub(super) fn asked_view<'a>(views: &'a [View], s: &Similarity, center: DVec3) -> Option<(&'a str, bool)> {
+/// The view that [`Heading`] refers to: its name, and whether it was taken from ahead under `s`. The view does not
+/// change if front and back are exchanged. `center` is the vehicle's middle, vehicle frame.
+pub(super) fn heading_view<'a>(views: &'a [View], s: &Similarity, center: DVec3) -> Option<(&'a str, bool)> {
     let forward = |view: &View| {
         let seen = s.transform_point(view.camera.center()) - center;
         seen.x / seen.truncate().length()
@@ -32,12 +32,12 @@ pub(super) fn asked_view<'a>(views: &'a [View], s: &Similarity, center: DVec3) -
     Some((&first.name, forward(first) > 0.0))
 }
 
-/// Whether `s` has to be turned round to be as `heading` says.
+/// Whether `s` must be turned round to agree with `heading`.
 pub(super) fn is_contrary(heading: Heading, views: &[View], s: &Similarity, center: DVec3) -> Result<bool> {
     if heading == Heading::Auto {
         return Ok(false);
     }
-    let Some((_, ahead)) = asked_view(views, s, center) else {
+    let Some((_, ahead)) = heading_view(views, s, center) else {
         let asked = if heading == Heading::Forward { "forward" } else { "backward" };
         let found = format!("{asked}, but all views were taken from abeam");
         return Err(Error::argument("heading", found, "auto, or a view from obliquely ahead or behind"));
@@ -45,14 +45,14 @@ pub(super) fn is_contrary(heading: Heading, views: &[View], s: &Similarity, cent
     Ok(ahead != (heading == Heading::Forward))
 }
 
-/// The refusal to guess, with what to answer.
+/// The error for an ambiguous heading; it explains how to choose one.
 pub(super) fn unknown(views: &[View], s: &Similarity, center: DVec3, why: &str) -> Error {
     let found = format!("auto, but {why}");
-    let allowed = match asked_view(views, s, center) {
+    let allowed = match heading_view(views, s, center) {
         Some((name, _)) => format!(
             "forward if {name} was taken from ahead of the vehicle's middle, backward if from behind it"
         ),
-        None => "a view from obliquely ahead or behind, to tell them by".into(),
+        None => "auto, with a view from obliquely ahead or behind to tell them apart".into(),
     };
     Error::argument("heading", found, allowed)
 }

@@ -1,21 +1,21 @@
-//! Points on the visual hull of the masks, in upright coordinates of the world: how far the vehicle reaches.
+//! Points on the visual hull of the masks, in upright coordinates of the world, for the vehicle's extent.
 
 use super::silhouettes::Outline;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use vg_geometry::progress::Watch;
 
-/// Cells along a side of the cube that is carved.
+/// Cells along a side of the carved cube.
 const CELLS: usize = 80;
 
-/// A cell on the surface is divided into so many along a side, which makes them a five-hundredth of the cube.
+/// Parts along a side into which a cell on the surface is divided, each about a five-hundredth of the cube.
 const PARTS: usize = 6;
 
-/// A point in the hull is seen by this part of the views at least: what few see, few can carve.
+/// Minimum share of the views that see a point of the hull: a point that few views see is hardly carved.
 const SEEN_SHARE: f64 = 0.5;
 
-/// Points of the hull's surface in coordinates turned by `upright_from_world`; `middle` is in the world, and `half` half
-/// the side of the cube. Also the distance between the points.
+/// Points of the hull's surface in coordinates rotated by `upright_from_world`, and the distance between them. `middle`
+/// is the cube's centre in the world, `half` half its side.
 pub(super) fn surface(
     outlines: &[Outline],
     upright_from_world: DMat3,
@@ -35,7 +35,7 @@ pub(super) fn surface(
         let p = at(*i);
         let inner = p.min_element() > 0.0 && p.max_element() < (CELLS - 1) as f64;
         let strides = [1, CELLS, CELLS * CELLS];
-        // A cell whose middle is carved may hold surface as well; then a neighbour is filled.
+        // A cell whose middle is carved may contain surface too; then a neighbour is filled.
         inner && strides.iter().any(|s| filled[i + s] != filled[*i] || filled[i - s] != filled[*i])
     };
     let part = cell / PARTS as f64;
@@ -52,7 +52,7 @@ pub(super) fn surface(
     (points.into_iter().flatten().collect(), part)
 }
 
-/// Whether no mask that sees the point says that it is not the vehicle.
+/// Whether a point is background in no mask and vehicle in enough of them.
 fn is_inside(outlines: &[Outline], world: DVec3) -> bool {
     let mut seen = 0;
     for outline in outlines {

@@ -1,4 +1,4 @@
-//! The sparse points of the vehicle against the scan's surface: point to plane, with scale.
+//! Point-to-plane ICP, with scale, of the vehicle's sparse points and the scan's surface.
 
 use super::scan::Scan;
 use super::silhouettes::Outline;
@@ -7,25 +7,25 @@ use glam::DVec3;
 use rayon::prelude::*;
 use vg_geometry::Similarity;
 
-/// A point is the vehicle's if so many views of those that could see it say so.
+/// Minimum share of masks that contain a vehicle point, of those whose picture it projects into.
 const INSIDE_SHARE: f64 = 0.95;
 
-/// Points of the vehicle, world: those that project into nearly all masks. Seen or hidden: what is in all masks is in
-/// the hull, where nothing is but the vehicle and some ground below it.
-pub(super) fn of_vehicle(sparse: &[DVec3], outlines: &[Outline]) -> Vec<DVec3> {
+/// Points of the vehicle, world: those that project into nearly all masks, visible or not. Such points are in the
+/// hull, which contains only the vehicle and some ground below it.
+pub(super) fn vehicle_points(sparse: &[DVec3], outlines: &[Outline]) -> Vec<DVec3> {
     let inside = |p: &&DVec3| {
-        let (mut asked, mut yes) = (0, 0);
-        for said in outlines.iter().filter_map(|o| o.shows_vehicle(**p)) {
-            asked += 1;
-            yes += usize::from(said);
+        let (mut known, mut inside) = (0, 0);
+        for is_vehicle in outlines.iter().filter_map(|o| o.shows_vehicle(**p)) {
+            known += 1;
+            inside += usize::from(is_vehicle);
         }
-        asked * 2 >= outlines.len() && f64::from(yes as u32) >= INSIDE_SHARE * f64::from(asked as u32)
+        known * 2 >= outlines.len() && f64::from(inside as u32) >= INSIDE_SHARE * f64::from(known as u32)
     };
     sparse.par_iter().filter(inside).copied().collect()
 }
 
-/// Distances of points to the scan's planes, in units of `noise` metres; points farther than `reach` metres say
-/// nothing (reflections, interiors, the ground).
+/// Distances of points to the scan's planes, in units of `noise` metres; points farther than `reach` metres only add a
+/// constant (reflections, interiors, the ground).
 pub(super) fn system(
     points: &[DVec3],
     scan: &Scan,
@@ -48,14 +48,14 @@ pub(super) fn system(
     system
 }
 
-/// Each point in the vehicle frame, its nearest point of the scan, and the signed distance along that one's normal.
+/// Each point in the vehicle frame, the index of its nearest scan point, and the signed distance along its normal.
 fn distances(points: &[DVec3], scan: &Scan, s: &Similarity, reach: f64) -> Vec<Option<(DVec3, usize, f64)>> {
-    let of = |p: &DVec3| {
+    let distance = |p: &DVec3| {
         let point = s.transform_point(*p);
         let index = scan.tree.nearest(point).filter(|found| found.squared < reach * reach)?.index;
         Some((point, index, scan.normals[index].dot(point - scan.points[index])))
     };
-    points.par_iter().map(of).collect()
+    points.par_iter().map(distance).collect()
 }
 
 /// Root mean square distance, metres, and number of the points within `reach` metres of the scan.

@@ -1,8 +1,8 @@
-//! From the arbitrary gauge of a structure-from-motion model to the metric vehicle frame.
+//! Alignment of a structure-from-motion model, in an arbitrary gauge, to the metric vehicle frame.
 //!
 //! [`to_scan`] takes a scanned point cloud in the vehicle's frame and masked views: the scan's outline must run along
 //! every mask's edge, and the sparse points of the vehicle must lie on the scan's surface. [`to_box`] takes the
-//! vehicle's size and the ground. Measured in docs/ALIGN.md.
+//! vehicle's size and the ground. Measurements are in docs/ALIGN.md.
 
 mod candidates;
 mod folder;
@@ -29,10 +29,10 @@ use vg_geometry::{Error, Result};
 use vg_scene::View;
 use vg_scene::undistort::undistorted;
 
-/// Fewer masks leave scale or place open.
+/// Minimum of masks that determines scale and position.
 pub const FEWEST_VIEWS: usize = 3;
 
-/// Points as the caller counts them, all finite.
+/// Returns an error, with the caller's index, if a point is not finite.
 fn check_sparse(sparse: &[DVec3]) -> Result<()> {
     match sparse.iter().position(|p| !p.is_finite()) {
         Some(i) => Err(Error::argument(format!("sparse[{i}]"), sparse[i].to_string(), "finite")),
@@ -40,25 +40,25 @@ fn check_sparse(sparse: &[DVec3]) -> Result<()> {
     }
 }
 
-/// Fewer pieces of edge in all masks together are no outline.
+/// Minimum of edge pieces in all masks together.
 const FEWEST_EDGES: usize = 60;
 
 fn outlines(views: &[View]) -> Result<Vec<Outline>> {
-    let of = |view: &View| {
+    let outline = |view: &View| {
         let view = undistorted(view)?;
         Ok(view.mask.as_ref().map(|mask| Outline::new(&view, mask)))
     };
-    let all: Vec<Option<Outline>> = views.par_iter().map(of).collect::<Result<_>>()?;
+    let all: Vec<Option<Outline>> = views.par_iter().map(outline).collect::<Result<_>>()?;
     let seen: Vec<Outline> = all.into_iter().flatten().filter(|o| o.edge_count() > 0).collect();
     let edges: usize = seen.iter().map(Outline::edge_count).sum();
     if seen.len() < FEWEST_VIEWS || edges < FEWEST_EDGES {
-        let found = format!("{} with a mask that shows an outline, of {}", seen.len(), views.len());
+        let found = format!("{} of {} have a mask that shows an outline", seen.len(), views.len());
         return Err(Error::argument("views", found, format!("at least {FEWEST_VIEWS}")));
     }
     Ok(seen)
 }
 
-/// No alignment fits. `check`: what of the caller's, beside the masks, may be why.
+/// The error if no alignment fits. `check` names the input to check in addition to the masks.
 fn nowhere(reason: &str, check: &str) -> Error {
     Error::Reconstruction { stage: "align", reason: format!("{reason}; check {check}, and the masks") }
 }

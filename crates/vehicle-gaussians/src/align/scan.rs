@@ -1,5 +1,5 @@
-//! The scan, made ready: strays dropped, noise taken off, a normal for every point, and the points that can ever be
-//! outermost.
+//! Preparation of the scan: removes stray points, smooths noise, and finds a normal for every point and the points that
+//! can be outermost in a picture.
 
 use glam::{DVec3, Vec3};
 use nalgebra::{Matrix3, SymmetricEigen};
@@ -9,53 +9,52 @@ use vg_geometry::robust::scramble;
 use vg_geometry::{Error, Result};
 use vg_scene::Cloud;
 
-/// More points than this say nothing new; of a longer scan, so many are drawn.
+/// Maximum of points; a random sample is drawn from a larger scan.
 const MOST_POINTS: usize = 60_000;
 
-/// Fewer points than this are no shape.
+/// Minimum of points on the surface.
 const FEWEST_POINTS: usize = 200;
 
-/// The plane of a point is that of so many neighbours: two or three spacings wide, within which a body panel is flat.
+/// The number of neighbours that define a point's plane: two or three spacings wide, within which a body panel is flat.
 const NEIGHBOURS: usize = 12;
 
-/// A point whose neighbours are this many times farther than usual is alone.
+/// Distance of a stray point's neighbours over the median distance.
 const ALONE: f64 = 3.0;
 
-/// A point this many times farther off its neighbours' plane than usual, and than they are themselves, is not of their
-/// surface.
+/// Distance of a stray point from its neighbours' plane, over the median distance and over the neighbours' own.
 const OFF: f64 = 6.0;
 
-/// Neighbours this many times farther off their own plane than usual lie across an edge: the plane would cut it off,
-/// and outlines are made of edges.
+/// Distance of neighbours from their own plane, over the median, from which they lie across an edge. Their plane would
+/// cut the edge off, and outlines consist of edges.
 const ACROSS_EDGE: f64 = 1.5;
 
-/// Sizes of a vehicle, metres: the longest side of the scan's box.
+/// Allowed sizes of a vehicle, metres: the longest side of the scan's box.
 const SIZES_M: std::ops::RangeInclusive<f64> = 1.0..=25.0;
 
-/// Directions in which the outermost points are looked for.
+/// The number of directions in which the outermost points are searched for.
 const DIRECTIONS: usize = 1000;
 
 /// A scan of a vehicle in the vehicle's frame, metres.
 pub(super) struct Scan {
     pub(super) points: Vec<DVec3>,
-    /// Unit, of either sign.
+    /// Unit normals of either sign.
     pub(super) normals: Vec<DVec3>,
     pub(super) tree: Nearest,
-    /// Middle of the box.
+    /// Middle of the bounding box.
     pub(super) center: DVec3,
-    /// The corners of the convex hull, nearly: no other point is outermost in any picture.
+    /// Approximate corners of the convex hull, the only points that can be outermost in a picture.
     pub(super) corners: Vec<DVec3>,
 }
 
 impl Scan {
     pub(super) fn new(cloud: &Cloud) -> Result<Self> {
-        // Scanners write in rows: shuffled, any part of the points shows all of the vehicle.
-        let mut order: Vec<usize> = (0..cloud.points().len()).collect();
-        order.sort_by_key(|&i| scramble(i as u64));
-        order.truncate(MOST_POINTS);
+        // Scanners write in rows: after a shuffle, any part of the points shows the whole vehicle.
+        let mut shuffled: Vec<usize> = (0..cloud.points().len()).collect();
+        shuffled.sort_by_key(|&i| scramble(i as u64));
+        shuffled.truncate(MOST_POINTS);
         let all: Vec<DVec3> =
-            order.into_iter().map(|i| Vec3::from_array(cloud.points()[i]).as_dvec3()).collect();
-        let dense = without_lonely(&all);
+            shuffled.into_iter().map(|i| Vec3::from_array(cloud.points()[i]).as_dvec3()).collect();
+        let dense = without_isolated(&all);
         let (points, normals) = smoothed(&dense);
         if points.len() < FEWEST_POINTS {
             let found = format!("{} points, of which {} lie on a surface", all.len(), points.len());
@@ -77,7 +76,7 @@ impl Scan {
     }
 }
 
-fn without_lonely(points: &[DVec3]) -> Vec<DVec3> {
+fn without_isolated(points: &[DVec3]) -> Vec<DVec3> {
     let tree = Nearest::new(points.iter().copied());
     let reach = |p: &DVec3| tree.k_nearest(*p, NEIGHBOURS / 2).last().map_or(0.0, |n| n.squared.sqrt());
     let reaches: Vec<f64> = points.par_iter().map(reach).collect();
@@ -85,8 +84,8 @@ fn without_lonely(points: &[DVec3]) -> Vec<DVec3> {
     points.iter().zip(&reaches).filter(|(_, r)| **r <= limit).map(|(p, _)| *p).collect()
 }
 
-/// Each point moved to the plane of its neighbours where they lie on one, with that plane's normal; without those far
-/// off it.
+/// Points moved to the plane of their neighbours where that is flat, with the plane's normal; points far from it are
+/// dropped.
 fn smoothed(points: &[DVec3]) -> (Vec<DVec3>, Vec<DVec3>) {
     let tree = Nearest::new(points.iter().copied());
     let plane = |p: &DVec3| {
@@ -103,7 +102,7 @@ fn smoothed(points: &[DVec3]) -> (Vec<DVec3>, Vec<DVec3>) {
         |plane: &Plane| plane.off.abs() <= OFF * off.max(plane.thickness) + 1e-6 && plane.normal.is_finite();
     let kept = points.iter().zip(&planes).filter(|(_, plane)| is_of_surface(plane));
     let settled = |(p, plane): (&DVec3, &Plane)| {
-        // The point is one of the witnesses of where the surface is.
+        // The point itself is one of the samples of the surface.
         let share = (NEIGHBOURS - 1) as f64 / NEIGHBOURS as f64;
         let is_flat = plane.thickness <= ACROSS_EDGE * thickness + 1e-6;
         (if is_flat { *p - share * plane.off * plane.normal } else { *p }, plane.normal)
@@ -114,9 +113,9 @@ fn smoothed(points: &[DVec3]) -> (Vec<DVec3>, Vec<DVec3>) {
 /// The plane of a point's neighbours.
 struct Plane {
     normal: DVec3,
-    /// Of the point.
+    /// Signed distance of the point from the plane.
     off: f64,
-    /// How far they lie off it themselves, root mean square.
+    /// Root mean square distance of the neighbours from the plane.
     thickness: f64,
 }
 
@@ -131,7 +130,7 @@ pub(super) fn plane_of(points: &[DVec3]) -> (DVec3, DVec3) {
     (middle, smallest_axis(spread))
 }
 
-/// The direction in which a symmetric matrix is smallest.
+/// Eigenvector of a symmetric matrix's smallest eigenvalue.
 pub(super) fn smallest_axis(matrix: Matrix3<f64>) -> DVec3 {
     let eigen = SymmetricEigen::new(matrix);
     let k = eigen.eigenvalues.imin();
@@ -155,7 +154,7 @@ fn corners(points: &[DVec3]) -> Vec<DVec3> {
     indices.into_iter().map(|i| points[i]).collect()
 }
 
-/// The middle value; 0 of none.
+/// Median; 0 for an empty slice.
 pub(super) fn median(values: &[f64]) -> f64 {
     let mut values = values.to_vec();
     let middle = values.len() / 2;

@@ -1,8 +1,8 @@
-//! The scan against the masks: its outline in every picture must run along the mask's.
+//! Comparison of the scan with the masks: its outline in every picture must run along the mask's edge.
 //!
-//! Coarsely by support functions (how far mask and scan reach in a direction of the picture, which sees convex
-//! outlines only but from anywhere), finely along the mask's edge (the outermost projected point beside each piece of
-//! edge, which sees hoods and windscreens but only from nearby).
+//! The coarse comparison uses support functions (the extent of mask and scan in a direction of the picture): it ignores
+//! concavities but works from any start. The fine one runs along the mask's edge (the outermost projected point
+//! next to each piece of edge): it resolves bonnets and windscreens but needs a close start.
 
 use super::scan::Scan;
 use super::solve::{Numbers, System, slope};
@@ -12,37 +12,37 @@ use vg_geometry::{Intrinsics, Pose, Similarity};
 use vg_scene::mask::Label;
 use vg_scene::{Mask, View};
 
-/// Directions of the support functions.
+/// The number of directions of the support functions.
 const DIRECTIONS: usize = 32;
 
-/// Every so many pieces of edge count: neighbours say the same.
+/// Step between the pieces of edge that are used: neighbours are redundant.
 const EDGE_STRIDE: usize = 3;
 
-/// Half the side of the window that an edge's direction is taken from, pixels.
+/// Half the side of the window from which an edge's direction is estimated, pixels.
 const NORMAL_WINDOW: i64 = 4;
 
-/// A point is beside a piece of edge within this many pixels along the edge.
+/// Largest distance of a point from a piece of edge, along the edge, pixels.
 const BESIDE_PX: f64 = 1.5;
 
-/// Pixels of a cell of projected points.
+/// Side of a cell of projected points, pixels.
 const CELL: f64 = 4.0;
 
-/// The scan's surface goes on beyond its outermost point: by the gap to the next point on average where points end
-/// abruptly (an edge), by half of it where they crowd (a rounded outline). Without this, vehicles come out 0.15 % too
-/// small.
+/// The scan's surface continues beyond its outermost point: on average by the gap to the next point where points end
+/// abruptly (an edge), by half of it where they are dense (a rounded outline). Without this, scans are placed 0.15 %
+/// too small.
 const GAP_SHARE: f64 = 0.75;
 
-/// Wider gaps are holes in the scan, pixels.
+/// Maximum gap between points, pixels; wider ones are holes in the scan.
 const WIDEST_GAP_PX: f64 = 2.0;
 
-/// Beyond an edge that looks into a gap of an open structure, a ladder or a rack, the outermost point is another rung's:
-/// gaps are narrower than this, pixels; what is farther is not looked for.
+/// Maximum width of a gap in an open structure such as a ladder or a rack, pixels: beyond an edge at a gap, the
+/// outermost point belongs to another rung.
 const OPEN_PX: i32 = 14;
 
-/// Part of the edges that must be open, or all are compared.
+/// Minimum share of open edges; below it, all edges are compared.
 const LEAST_OPEN: f64 = 0.1;
 
-/// Points nearer to a camera than this have no place in its picture, metres.
+/// Nearest depth at which a point is projected, metres.
 const NEAR_M: f64 = 0.05;
 
 /// One picture's outline.
@@ -52,16 +52,16 @@ pub(super) struct Outline {
     width: usize,
     height: usize,
     labels: Vec<Label>,
-    /// Direction and how far the mask reaches there; not where the picture cuts it.
+    /// Directions and the mask's extent in them, except where the picture cuts the mask.
     support: Vec<(DVec2, f64)>,
-    /// Middle of a piece of edge, and outward unit normal.
+    /// Pieces of edge: middle and outward unit normal.
     edges: Vec<(DVec2, DVec2)>,
-    /// Whether an edge looks out into the open: no vehicle within [`OPEN_PX`] beyond it.
+    /// Whether each edge is open: no vehicle within [`OPEN_PX`] beyond it.
     open: Vec<bool>,
 }
 
 impl Outline {
-    /// Of an undistorted view whose camera is posed in the world, and its mask.
+    /// The outline of a mask in an undistorted view whose camera is posed in the world.
     pub(super) fn new(view: &View, mask: &Mask) -> Self {
         let (width, height) = (mask.width() as usize, mask.height() as usize);
         let labels = mask.labels().to_vec();
@@ -81,14 +81,14 @@ impl Outline {
     }
 
     fn label(&self, u: i64, v: i64) -> Label {
-        // What is beyond the picture is not known.
+        // Pixels beyond the picture are unknown.
         if u < 0 || v < 0 || u >= self.width as i64 || v >= self.height as i64 {
             return Label::Unknown;
         }
         self.labels[v as usize * self.width + u as usize]
     }
 
-    /// Pieces of edge run between a vehicle pixel and a background pixel beside it.
+    /// Finds the pieces of edge, each between a vehicle pixel and a background neighbour.
     fn find_edges(&mut self) {
         let mut edges = Vec::new();
         for v in 0..self.height as i64 {
@@ -111,14 +111,15 @@ impl Outline {
     }
 
     fn is_open(&self, &(middle, normal): &(DVec2, DVec2)) -> bool {
-        // The first two pixels may be the rough edge's own.
+        // The first two pixels may belong to the rough edge itself.
         (2..=OPEN_PX).all(|step| {
             let pixel = middle + f64::from(step) * normal;
             self.label(pixel.x.floor() as i64, pixel.y.floor() as i64) != Label::Vehicle
         })
     }
 
-    /// Away from the vehicle pixels around, `None` where the picture's border is near or the edge is a speck's.
+    /// Direction away from the vehicle pixels around; `None` near unknown pixels or the picture's border, and for
+    /// specks.
     fn normal(&self, u: i64, v: i64) -> Option<DVec2> {
         let mut sum = DVec2::ZERO;
         for dv in -NORMAL_WINDOW..=NORMAL_WINDOW {
@@ -149,13 +150,13 @@ impl Outline {
             let reach = |p: &DVec2| p.dot(direction);
             let farthest = rim.iter().copied().reduce(|a, b| if reach(&b.0) > reach(&a.0) { b } else { a });
             if let Some((pixel, false)) = farthest {
-                // Half a pixel from the last centre inside to the edge.
+                // The edge is half a pixel beyond the last centre inside.
                 self.support.push((direction, reach(&pixel) + 0.5));
             }
         }
     }
 
-    /// Camera's position and looking direction through the middle of the mask, world.
+    /// The camera's position and the direction through the middle of the mask, world.
     pub(super) fn central_ray(&self) -> Option<(DVec3, DVec3)> {
         let middle = self.edges.iter().map(|e| e.0).sum::<DVec2>() / self.edges.len() as f64;
         let [x, y] = self.intrinsics.normalized_from_pixel(middle.to_array());
@@ -163,7 +164,8 @@ impl Outline {
         direction.is_finite().then_some((self.world_from_camera.translation, direction))
     }
 
-    /// Half the mean width of the mask over the directions that end in the picture, as the tangent of an angle.
+    /// Half the mean width of the mask, over the directions in which the picture does not cut it, as the tangent of an
+    /// angle.
     pub(super) fn angular_radius(&self) -> Option<f64> {
         let opposite = |d: DVec2| self.support.iter().find(|s| s.0.dot(d) < -0.999).map(|s| s.1);
         let widths: Vec<f64> = self.support.iter().filter_map(|&(d, h)| Some(h + opposite(d)?)).collect();
@@ -176,12 +178,12 @@ impl Outline {
         &self.world_from_camera
     }
 
-    /// Pieces of edge that are asked.
+    /// The number of pieces of edge.
     pub(super) fn edge_count(&self) -> usize {
         self.edges.len()
     }
 
-    /// Whether a point of the world shows vehicle; `None` where the picture says nothing.
+    /// Whether a point of the world projects to a vehicle pixel; `None` if the label is unknown.
     pub(super) fn shows_vehicle(&self, world: DVec3) -> Option<bool> {
         let p = self.world_from_camera.inverse().transform_point(world);
         if p.z <= 0.0 {
@@ -202,8 +204,8 @@ impl Outline {
             .then(|| DVec2::from_array(self.intrinsics.pixel_from_normalized([p.x / p.z, p.y / p.z])))
     }
 
-    /// How the pixel of `point` moves along `direction` with the seven numbers. The similarity moves the cameras; for
-    /// them the point goes the other way.
+    /// Derivatives of the pixel of `point` along `direction` with respect to the seven parameters. The similarity moves
+    /// the cameras; relative to them the point moves the opposite way.
     fn pixel_slope(&self, point: DVec3, pose: &Pose, center: DVec3, direction: DVec2) -> Numbers {
         let p = pose.rotation.transpose() * (point - pose.translation);
         let (fx, fy) = (self.intrinsics.fx * direction.x, self.intrinsics.fy * direction.y);
@@ -211,7 +213,7 @@ impl Outline {
         -slope(point, center, pose.rotation * along)
     }
 
-    /// Support functions of scan and mask, differences in pixels.
+    /// Differences of the support functions of scan and mask, pixels.
     fn coarse(&self, scan: &Scan, s: &Similarity, bend: f64) -> System {
         let mut system = System::new();
         let pose = s.transform_pose(&self.world_from_camera);
@@ -219,7 +221,7 @@ impl Outline {
         let pixels: Vec<Option<DVec2>> =
             scan.corners.iter().map(|p| self.pixel(camera_from_vehicle.transform_point(*p))).collect();
         if pixels.iter().any(Option::is_none) {
-            // Inside the vehicle, or in front of it and looking away.
+            // The camera is inside the vehicle or looks away from it.
             system.add_constant(1e6 * self.support.len() as f64);
             return system;
         }
@@ -237,8 +239,7 @@ impl Outline {
         system
     }
 
-    /// For each piece of edge: by how much the scan's outline lies outside, pixels, the point, and its distance; `None`
-    /// where no point is within `reach` pixels.
+    /// The scan's outline at each piece of edge; `None` if no point is within `reach` pixels.
     fn misses(&self, points: &[DVec3], pose: &Pose, reach: f64) -> Vec<Option<Miss>> {
         let camera_from_vehicle = pose.inverse();
         let cells = Cells::new(self, points.iter().map(|p| camera_from_vehicle.transform_point(*p)));
@@ -266,7 +267,7 @@ impl Outline {
         self.edges.iter().map(outermost).collect()
     }
 
-    /// Outlines of scan and mask, differences in pixels.
+    /// Distances between the outlines of scan and mask, pixels.
     fn fine(&self, points: &[DVec3], s: &Similarity, center: DVec3, reach: f64, bend: f64) -> System {
         let mut system = System::new();
         let pose = s.transform_pose(&self.world_from_camera);
@@ -283,22 +284,22 @@ impl Outline {
     }
 }
 
-/// The scan's outline beside a piece of edge.
+/// The scan's outline at a piece of edge.
 struct Miss {
-    /// How far outside it lies, pixels.
+    /// Distance of the outline outside the mask's edge, pixels.
     out: f64,
-    /// The outermost point.
+    /// Index of the outermost point.
     index: usize,
-    /// Its depth, metres.
+    /// Depth of the outermost point, metres.
     distance: f64,
 }
 
-/// Projected points by cells of the picture; those of a cell are chained.
+/// Projected points by cells of the picture, as one linked list per cell.
 struct Cells {
     columns: usize,
     rows: usize,
     first: Vec<u32>,
-    /// Pixel, index of the point, and the next one of the cell.
+    /// Pixel, index of the point, and position of the next entry of the cell.
     seen: Vec<(DVec2, u32, u32)>,
 }
 
@@ -318,7 +319,7 @@ impl Cells {
         cells
     }
 
-    /// All points in the cells that a square of half a side `reach` touches.
+    /// Visits all points in the cells that the square around `middle` with half side `reach` touches.
     fn around(&self, middle: DVec2, reach: f64, mut visit: impl FnMut(DVec2, usize)) {
         let range = |x: f64, n: usize| {
             let low = ((x - reach) / CELL).max(0.0) as usize;
@@ -336,12 +337,12 @@ impl Cells {
     }
 }
 
-/// All pictures' support functions.
+/// Sum of [`Outline::coarse`] over all pictures.
 pub(super) fn coarse(outlines: &[&Outline], scan: &Scan, s: &Similarity, bend: f64) -> System {
     System::sum(outlines.par_iter().map(|o| o.coarse(scan, s, bend)).collect::<Vec<_>>())
 }
 
-/// All pictures' outlines.
+/// Sum of [`Outline::fine`] over all pictures.
 pub(super) fn fine(
     outlines: &[Outline],
     points: &[DVec3],
@@ -350,24 +351,24 @@ pub(super) fn fine(
     reach: f64,
     bend: f64,
 ) -> System {
-    let of = |o: &Outline| o.fine(points, s, center, reach, bend);
-    System::sum(outlines.par_iter().map(of).collect::<Vec<_>>())
+    let fine = |o: &Outline| o.fine(points, s, center, reach, bend);
+    System::sum(outlines.par_iter().map(fine).collect::<Vec<_>>())
 }
 
-/// How far outlines of scan and mask lie apart.
+/// Distance between the outlines of scan and mask.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Misses {
-    /// Mean over all pieces of edge, pixels; where no point is near, the reach.
+    /// Mean over all pieces of edge, pixels; a piece without a point counts as the reach.
     pub(super) mean_px: f64,
-    /// Mean over the pieces that look out into the open, which can be compared whatever the structure, pixels.
+    /// Mean over the open pieces, which can be compared for any structure, pixels.
     pub(super) open_px: f64,
-    /// Median, metres at the point's distance; infinite where most have no point near.
+    /// Median, metres at the point's distance; infinite if most pieces have no point.
     pub(super) median_m: f64,
 }
 
-/// Measures with points up to `reach` pixels from the edge.
+/// Measures the distance between the outlines with points up to `reach` pixels from the edge.
 pub(super) fn misses(outlines: &[Outline], points: &[DVec3], s: &Similarity, reach: f64) -> Misses {
-    let of = |o: &Outline| {
+    let sizes_in = |o: &Outline| {
         let found = o.misses(points, &s.transform_pose(&o.world_from_camera), reach);
         let focal = o.intrinsics.smaller_focal();
         let far = (reach, f64::INFINITY);
@@ -379,7 +380,7 @@ pub(super) fn misses(outlines: &[Outline], points: &[DVec3], s: &Similarity, rea
         found.into_iter().zip(&o.open).map(sizes).collect::<Vec<_>>()
     };
     let all: Vec<(f64, f64, bool)> =
-        outlines.par_iter().map(of).collect::<Vec<_>>().into_iter().flatten().collect();
+        outlines.par_iter().map(sizes_in).collect::<Vec<_>>().into_iter().flatten().collect();
     let metres: Vec<f64> = all.iter().map(|m| m.1).collect();
     let mean = |chosen: &dyn Fn(bool) -> bool| {
         let chosen = all.iter().filter(|m| chosen(m.2)).map(|m| m.0);

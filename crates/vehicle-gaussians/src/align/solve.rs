@@ -1,17 +1,17 @@
-//! Gauss-Newton on the seven numbers of a similarity, damped as by Levenberg and Marquardt.
+//! Levenberg-Marquardt on the seven parameters of a similarity.
 //!
-//! A step is left-multiplied: a point x of the vehicle frame goes to x + omega x (x - c) + t + sigma (x - c), c the middle of the
-//! scan, so that turn, move and scale hardly depend on each other.
+//! A step is left-multiplied: a point x of the vehicle frame moves to x + omega x (x - c) + t + sigma (x - c), with c
+//! the middle of the scan, so that rotation, translation and scale are nearly independent.
 
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Cholesky, SMatrix, SVector};
 use vg_geometry::Similarity;
 use vg_geometry::progress::Watch;
 
-/// omega (radians), t (metres), sigma (1).
+/// Parameters of a step: omega (radians), t (metres), sigma (1).
 pub(super) type Numbers = SVector<f64, 7>;
 
-/// Normal equations and what they are the slope of.
+/// Normal equations and the cost that they belong to.
 #[derive(Clone)]
 pub(super) struct System {
     matrix: SMatrix<f64, 7, 7>,
@@ -25,7 +25,7 @@ impl System {
         Self { matrix: SMatrix::zeros(), right: Numbers::zeros(), cost: 0.0 }
     }
 
-    /// A residual in units of its noise, its slope, and the Huber loss that is linear from `bend` on.
+    /// Adds a residual, in units of its noise, with its derivatives, under a Huber loss that is linear from `bend` on.
     pub(super) fn add(&mut self, residual: f64, slope: &Numbers, weight: f64, bend: f64) {
         let size = residual.abs();
         let (loss, part) =
@@ -35,12 +35,12 @@ impl System {
         self.right -= (weight * part * residual) * slope;
     }
 
-    /// A residual that is missing: a constant.
+    /// Adds the constant loss of a missing residual.
     pub(super) fn add_constant(&mut self, loss: f64) {
         self.cost += loss;
     }
 
-    /// The sum, in the order given.
+    /// Sum of systems, in the given order.
     pub(super) fn sum(systems: impl IntoIterator<Item = Self>) -> Self {
         systems.into_iter().fold(Self::new(), |mut sum, s| {
             sum.matrix += s.matrix;
@@ -60,7 +60,7 @@ impl System {
     }
 }
 
-/// How a point of the vehicle frame moves along `direction` with each of the seven numbers.
+/// Derivatives of a point's coordinate along `direction`, vehicle frame, with respect to the seven parameters.
 pub(super) fn slope(point: DVec3, center: DVec3, direction: DVec3) -> Numbers {
     let arm = point - center;
     let turn = arm.cross(direction);
@@ -73,12 +73,12 @@ pub(super) fn moved(s: &Similarity, center: DVec3, step: &Numbers) -> Similarity
     let grow = step[6].clamp(-0.3, 0.3).exp();
     let translation =
         center + grow * (turn * (s.translation - center)) + DVec3::new(step[3], step[4], step[5]);
-    // Products of rotations drift off being one.
+    // Renormalise: products of rotations drift.
     let rotation = DMat3::from_quat(DQuat::from_mat3(&(turn * s.rotation)).normalize());
     Similarity { scale: s.scale * grow, rotation, translation }
 }
 
-/// From `start` downhill, at most `steps` steps.
+/// Minimises the cost from `start` in at most `steps` steps; returns the similarity and its cost.
 pub(super) fn descend(
     start: Similarity,
     center: DVec3,

@@ -1,8 +1,8 @@
-//! To the vehicle's frame by its size and the ground alone: the hull of the masks is turned upright, its outline from
-//! above gives the axes, and the box its scale.
+//! Alignment by the vehicle's size and the ground alone: the hull of the masks is turned upright, its outline from
+//! above gives the axes, and the box the scale.
 
 use super::footprint::Footprint;
-use super::heading::{Heading, asked_view, is_contrary, unknown};
+use super::heading::{Heading, heading_view, is_contrary, unknown};
 use super::{candidates, check_sparse, ground, hull, nowhere, outlines};
 use glam::{DMat3, DVec2, DVec3};
 use std::f64::consts::FRAC_PI_2;
@@ -11,17 +11,17 @@ use vg_geometry::progress::{UNWATCHED, Watch};
 use vg_geometry::{Error, Result};
 use vg_scene::View;
 
-/// Half the side of the cube that holds the vehicle, in mean radii of its masks: a car's half diagonal is less than
+/// Half the side of the cube around the vehicle, in mean radii of its masks: a car's half diagonal is less than
 /// twice its mean radius.
 const CUBE: f64 = 2.2;
 
-/// Sides of a box, metres.
+/// Allowed sides of a box, metres.
 const SIDES_M: std::ops::RangeInclusive<f64> = 0.2..=30.0;
 
-/// A box whose sides fit worse than this share of its longest is not of this vehicle.
+/// Largest misfit of a box of this vehicle, as a share of its longest side.
 const WORST_SHARE: f64 = 0.15;
 
-/// Which part of the work is done after each step, by the time that it takes.
+/// Progress after each step, by the time that it takes.
 const DONE: Done = Done { outlines: 0.2, ground: 0.4, hull: 0.95 };
 
 /// See [`DONE`].
@@ -31,41 +31,41 @@ struct Done {
     hull: f64,
 }
 
-/// A similarity found with a box, and how well it fits.
+/// A similarity found with a box, and the quality of its fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoxAlignment {
-    /// From the views' world to the vehicle's frame, metres; its origin is the box's middle.
+    /// Similarity from the views' world to the vehicle's frame, metres; its origin is the box's middle.
     pub vehicle_from_world: Similarity,
     /// Length, width and height of the masks' hull under this scale, metres.
     pub found_m: [f64; 3],
-    /// Root mean square difference of these from the box's, metres.
+    /// Root mean square difference of `found_m` from the box's sides, metres.
     pub residual_m: f64,
     /// 1 - residual / the residual with length and width exchanged, 0 to 1.
     pub confidence: f64,
-    /// Views whose masks were used.
+    /// The number of views whose masks were used.
     pub views: usize,
-    /// The view that told front from back.
-    pub asked_view: String,
+    /// Name of the view that distinguished front from back.
+    pub heading_view: String,
 }
 
-/// The similarity that takes the world of masked views to the frame of a box of length, width and height `size` that
-/// stands on the ground, metres.
+/// Aligns the world of masked views to the frame of a box of length, width and height `size` that stands on the ground,
+/// metres.
 ///
-/// `views` carry `world_from_camera` as their camera's pose. `sparse` are points of that world that show the ground
-/// among other things. Nothing tells front from back: `heading` must. The result does not depend on the number of
-/// threads.
+/// `views` carry `world_from_camera` as their camera's pose. `sparse` are points of that world, some of them on the
+/// ground. A box has the same shape from ahead and from behind, so `heading` must distinguish them. The result does not
+/// depend on the number of threads.
 ///
 /// # Errors
-/// A size that is no vehicle's, too few masks, no ground among the points, [`Heading::Auto`], and a hull of other
+/// A size that no vehicle has, too few masks, no ground among the points, [`Heading::Auto`], and a hull of other
 /// proportions.
 pub fn to_box(views: &[View], sparse: &[DVec3], size: [f64; 3], heading: Heading) -> Result<BoxAlignment> {
     to_box_watched(views, sparse, size, heading, &UNWATCHED)
 }
 
-/// As [`to_box`], under `watch`.
+/// [`to_box`] under `watch`.
 ///
 /// # Errors
-/// Those of [`to_box`], and [`Error::Cancelled`].
+/// The errors of [`to_box`], and [`Error::Cancelled`].
 pub fn to_box_watched(
     views: &[View],
     sparse: &[DVec3],
@@ -96,7 +96,7 @@ pub fn to_box_watched(
     let ground = up.dot(on_ground);
     let points: Vec<DVec3> = points.into_iter().filter(|p| p.z > ground).collect();
     if points.is_empty() {
-        return Err(nowhere("nothing above the ground is in all masks", "the sparse points"));
+        return Err(nowhere("no point above the ground lies inside all masks", "the sparse points"));
     }
     let top = points.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max) + 0.5 * between;
     let footprint = Footprint::new(points.iter().map(|p| p.truncate()).collect());
@@ -114,7 +114,7 @@ pub fn to_box_watched(
     if fit.residual > WORST_SHARE * size.max_element() {
         let [l, w, h] = fit.found.to_array();
         let reason = format!(
-            "a box of {:.2} x {:.2} x {:.2} m does not fit the masks' hull, at best {l:.2} x {w:.2} x {h:.2} m",
+            "a box of {:.2} x {:.2} x {:.2} m does not fit the masks' hull of at best {l:.2} x {w:.2} x {h:.2} m",
             size.x, size.y, size.z
         );
         return Err(nowhere(&reason, "that the size is of this vehicle and in metres"));
@@ -129,26 +129,27 @@ pub fn to_box_watched(
     if is_contrary(heading, views, &found, DVec3::ZERO)? {
         found = candidates::turned(&found, DVec3::ZERO);
     }
-    let asked_view = asked_view(views, &found, DVec3::ZERO).map_or("", |v| v.0).to_owned();
+    let heading_view = heading_view(views, &found, DVec3::ZERO).map_or("", |v| v.0).to_owned();
     Ok(BoxAlignment {
         vehicle_from_world: found,
         found_m: fit.found.to_array(),
         residual_m: fit.residual,
         confidence: (1.0 - fit.residual / other.residual.max(1e-9)).clamp(0.0, 1.0),
         views: outlines.len(),
-        asked_view,
+        heading_view,
     })
 }
 
-/// The scale under which three sides are most like those of a box.
+/// The scale under which three sides fit those of a box best.
 struct Fit {
-    /// Direction of the first side, upright coordinates, and the middle in axes so turned.
+    /// Direction of the first side, upright coordinates.
     axis: f64,
+    /// Middle, in coordinates along the axis.
     middle: DVec2,
     scale: f64,
-    /// The sides under it.
+    /// The scaled sides.
     found: DVec3,
-    /// Root mean square difference.
+    /// Root mean square difference of the sides.
     residual: f64,
 }
 

@@ -1,7 +1,8 @@
-//! To the frame of a scan: candidates by support functions, told apart and refined by outlines and sparse points.
+//! Alignment to the frame of a scan: candidates by support functions, selected and refined by outlines and sparse
+//! points.
 
 use super::candidates::turned;
-use super::heading::{Heading, asked_view, is_contrary, unknown};
+use super::heading::{Heading, heading_view, is_contrary, unknown};
 use super::scan::Scan;
 use super::silhouettes::Outline;
 use super::{candidates, check_sparse, ground, icp, nowhere, outlines, silhouettes, solve};
@@ -11,43 +12,42 @@ use vg_geometry::Similarity;
 use vg_geometry::progress::{UNWATCHED, Watch};
 use vg_scene::{Cloud, View};
 
-/// Coarse alignments that are tried with the first rounds.
+/// The number of coarse alignments tried in the first rounds.
 const TRIED: usize = 4;
 
-/// Rounds of refinement that tell which coarse alignment is right, on every [`THINNED`]th point.
+/// Rounds of refinement that select the right coarse alignment, on every [`THINNED`]th point.
 const FIRST_ROUNDS: usize = 2;
 
-/// See [`FIRST_ROUNDS`]: points twice as far apart.
+/// Thinning in the first rounds, which doubles the distance between points.
 const THINNED: usize = 4;
 
-/// Rounds of refinement: how far from the edge the outline is looked for and where the loss bends, pixels; how far
-/// from the scan a sparse point counts, metres.
+/// Rounds of refinement: largest distance of the outline from the edge and start of the linear loss, pixels; largest
+/// distance of a sparse point from the scan, metres.
 const ROUNDS: [(f64, f64, f64); 3] = [(16.0, 6.0, 0.3), (8.0, 2.0, 0.1), (4.0, 1.0, 0.04)];
 
-/// Steps of a round.
+/// Maximum of steps of a round.
 const STEPS: usize = 12;
 
-/// Alignments are compared with points this near to the edges, pixels.
+/// Largest distance of points from the edges when alignments are compared, pixels.
 const COMPARED_PX: f64 = 12.0;
 
-/// Noise of a sparse point that is on the surface, metres.
+/// Noise of a sparse point on the surface, metres.
 const POINT_NOISE_M: f64 = 0.01;
 
-/// All sparse points together weigh at most as much as all edges.
+/// Maximum weight of all sparse points together, relative to all edges.
 const POINTS_SHARE: f64 = 1.0;
 
-/// A scan whose outline misses the masks by more than this on average, where they look out into the open, pixels per 512
-/// of picture width, is not of this vehicle, or not in metres: wrong headings miss by 2 and more, right ones by less
-/// than 1.
+/// Largest mean distance between the outline and open edges, pixels per 512 of picture width. A larger one means that
+/// the scan shows another vehicle or is not in metres: wrong headings miss by 2 and more, right ones by less than 1.
 const WORST_PX: f64 = 5.0;
 
-/// What to look at where no alignment fits.
+/// The input to check if no alignment fits.
 const CHECK: &str = "that the scan is of this vehicle and in metres";
 
-/// Least [`ScanAlignment::confidence`] for which front and back are told apart.
+/// Minimum [`ScanAlignment::confidence`] at which front and back are distinguished.
 pub const LEAST_CONFIDENCE: f64 = 0.1;
 
-/// Which part of the work is done after each step, by the time that it takes.
+/// Progress after each step, by the time that it takes.
 const DONE: Done = Done { outlines: 0.05, scan: 0.1, candidates: 0.4, tried: 0.8 };
 
 /// See [`DONE`].
@@ -58,46 +58,46 @@ struct Done {
     tried: f64,
 }
 
-/// A similarity found with a scan, and how well it fits.
+/// A similarity found with a scan, and the quality of its fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScanAlignment {
-    /// From the views' world to the scan's frame, metres.
+    /// Similarity from the views' world to the scan's frame, metres.
     pub vehicle_from_world: Similarity,
     /// Median distance between the outlines of scan and masks, metres at the vehicle.
     pub residual_m: f64,
-    /// Mean distance between them, pixels.
+    /// Mean distance between the outlines, pixels.
     pub residual_px: f64,
-    /// The same for the best alignment with front and back exchanged.
+    /// Mean distance for the best alignment with front and back exchanged, pixels.
     pub other_px: f64,
-    /// 1 - residual / the other way round's, 0 to 1: 0 where front and back fit equally well.
+    /// 1 - `residual_px` / `other_px`, 0 to 1: 0 if front and back fit equally well.
     pub confidence: f64,
-    /// Views whose masks were used.
+    /// The number of views whose masks were used.
     pub views: usize,
-    /// Sparse points on the scan's surface, and their root mean square distance from it, metres.
+    /// The number of sparse points on the scan's surface.
     pub points: usize,
-    /// See `points`; 0 without any.
+    /// Root mean square distance of these points from the surface, metres; 0 without any.
     pub points_m: f64,
-    /// The view that [`Heading`] speaks of.
-    pub asked_view: Option<String>,
+    /// Name of the view that [`Heading`] refers to.
+    pub heading_view: Option<String>,
 }
 
-/// The similarity that takes the world of masked views to the frame of a scan.
+/// Aligns the world of masked views to the frame of a scan.
 ///
-/// `views` carry `world_from_camera` as their camera's pose, the world being any gauge; their pictures are not looked
-/// at. `sparse` are points of that world, which may show anything; none are needed. `scan` is in the vehicle's frame,
-/// metres, with noise and strays. The result does not depend on the number of threads.
+/// `views` carry `world_from_camera` as their camera's pose, in any gauge; their pictures are not read. `sparse` are
+/// points of that world, which may show anything and may be empty. `scan` is in the vehicle's frame, metres; noise and
+/// stray points are allowed. The result does not depend on the number of threads.
 ///
 /// # Errors
-/// Fewer than [`super::FEWEST_VIEWS`] masks, a scan without surface or not of a vehicle's size, an outline that nowhere
-/// fits the masks, and front and back that cannot be told apart under [`Heading::Auto`].
+/// Fewer than [`super::FEWEST_VIEWS`] masks, a scan without surface or not of a vehicle's size, an outline that fits
+/// the masks nowhere, and front and back that cannot be told apart under [`Heading::Auto`].
 pub fn to_scan(views: &[View], sparse: &[DVec3], scan: &Cloud, heading: Heading) -> Result<ScanAlignment> {
     to_scan_watched(views, sparse, scan, heading, &UNWATCHED)
 }
 
-/// As [`to_scan`], under `watch`.
+/// [`to_scan`] under `watch`.
 ///
 /// # Errors
-/// Those of [`to_scan`], and [`Error::Cancelled`](vg_geometry::Error::Cancelled).
+/// The errors of [`to_scan`], and [`Error::Cancelled`](vg_geometry::Error::Cancelled).
 pub fn to_scan_watched(
     views: &[View],
     sparse: &[DVec3],
@@ -113,7 +113,7 @@ pub fn to_scan_watched(
     let up = ground::plane(sparse, &outlines).map(|ground| ground.1);
     let starts = candidates::find(&outlines, &scan, up, watch)?;
     watch.report(DONE.candidates)?;
-    let points = icp::of_vehicle(sparse, &outlines);
+    let points = icp::vehicle_points(sparse, &outlines);
 
     let thin: Vec<DVec3> = scan.points.iter().step_by(THINNED).copied().collect();
     let tried = |s: Similarity| {
@@ -125,8 +125,10 @@ pub fn to_scan_watched(
         (s, silhouettes::misses(&outlines, &scan.points, &s, COMPARED_PX))
     };
     let first: Vec<(Similarity, f64)> = starts.into_iter().take(TRIED).map(tried).collect();
-    let best = best_of(first.iter().copied()).ok_or_else(|| nowhere("no start leads anywhere", CHECK))?;
-    // Whatever was found upright the other way round, and the best one exactly turned.
+    let best =
+        best_of(first.iter().copied()).ok_or_else(|| nowhere("no coarse alignment was found", CHECK))?;
+    // Candidates for the opposite heading: those found upright the other way round, and the best one turned by 180
+    // degrees.
     let is_opposite = |s: &Similarity| {
         let turn = s.rotation * best.rotation.transpose();
         turn.x_axis.x < 0.0 && turn.z_axis.z > 0.0
@@ -137,13 +139,13 @@ pub fn to_scan_watched(
     watch.report(DONE.tried)?;
     let mut both = [finished(best), finished(other)];
     watch.check()?;
-    // All points may judge otherwise than every fourth.
+    // The order may differ between all points and every fourth.
     both.sort_by(|a, b| a.1.mean_px.total_cmp(&b.1.mean_px));
     let [(best, misses), (other, other_misses)] = both;
     let worst = WORST_PX * f64::from(views[0].camera.width) / 512.0;
     if !(misses.open_px <= worst && misses.median_m.is_finite()) {
         let reason = format!(
-            "the scan's outline misses the masks' edges by {:.1} pixels on average, allowed: {worst:.1}",
+            "the scan's outline misses the masks' edges by {:.1} pixels on average, allowed: at most {worst:.1}",
             misses.open_px
         );
         return Err(nowhere(&reason, CHECK));
@@ -170,7 +172,7 @@ pub fn to_scan_watched(
         views: outlines.len(),
         points: on_surface,
         points_m,
-        asked_view: asked_view(views, &chosen, scan.center).map(|v| v.0.to_owned()),
+        heading_view: heading_view(views, &chosen, scan.center).map(|v| v.0.to_owned()),
     })
 }
 
@@ -178,7 +180,7 @@ fn best_of(found: impl Iterator<Item = (Similarity, f64)>) -> Option<Similarity>
     found.min_by(|a, b| a.1.total_cmp(&b.1)).map(|f| f.0)
 }
 
-/// `surface` are points of the scan, `sparse` points of the world that show the vehicle.
+/// Refines an alignment. `surface` are points of the scan, `sparse` points of the world that show the vehicle.
 fn refine(
     outlines: &[Outline],
     scan: &Scan,

@@ -1,8 +1,9 @@
-//! How well a ray meets all cones: the largest value, along the ray, of the smallest distance inside them.
+//! Agreement of a ray with all cones: the maximum, along the ray, of the smallest distance inside them.
 //!
 //! The ray of a pixel on a silhouette's edge touches the vehicle, and the vehicle is inside every cone: somewhere on
 //! the ray all other cones, mirrored ones too, have a value of at least 0 (silhouette coherence, Hernandez, Schmitt
-//! and Cipolla 2007, with the mirrored cameras as further cameras). What is missing to 0 is the ray's deficit.
+//! and Cipolla 2007, with the mirrored cameras as further cameras). The amount by which the maximum is below 0 is the
+//! ray's deficit.
 
 use super::correction::Correction;
 use super::samples::Sample;
@@ -11,18 +12,18 @@ use glam::{DVec3, Mat3, Vec3};
 use vg_geometry::Pose;
 use vg_scene::View;
 
-/// The cones fall off no faster than this along a ray, metres per metre: 1 across a pixel's own ray, more off the
+/// Maximum slope of a cone's value along a ray, metres per metre: 1 across a pixel's own ray, more off the
 /// optical axis and where the ray runs towards the camera.
 const STEEPEST: f32 = 1.5;
 
-/// Resolution of the search along a ray, metres; its best place is then refined between the neighbours.
+/// Resolution of the search along a ray, metres; the best place is then refined between its neighbours.
 const STEP_M: f32 = 0.03;
 
-/// How far a meeting may wander along its ray in one step of the solver, metres.
+/// Largest move of a meeting along its ray in one step of the solver, metres.
 const NEARBY_M: f32 = 0.3;
 
-/// How far to either side the slope of a cone is measured, metres: about a pixel, so that a distance transform's
-/// kinks do not decide it.
+/// Step of the central difference for the slope of a cone, metres: about a pixel, to smooth out the kinks of the
+/// distance transform.
 const SLOPE_STEP_M: f32 = 0.01;
 
 /// All views' cones with corrected cameras.
@@ -34,30 +35,31 @@ pub(super) struct Cones<'a> {
     camera_from_vehicle: Vec<(Mat3, Vec3)>,
     /// `[views]`
     vehicle_from_camera: Vec<(Mat3, Vec3)>,
-    /// Where the vehicle is: rays are followed through this ball.
+    /// Centre of the ball around the vehicle, within which rays are searched.
     middle: Vec3,
+    /// Radius of the ball.
     radius: f32,
 }
 
-/// Where the vehicle is.
+/// Ball around the vehicle, vehicle frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ball {
-    /// Metres.
+    /// Centre, metres.
     pub(super) middle: DVec3,
-    /// Metres.
+    /// Radius, metres.
     pub(super) radius: f64,
 }
 
-/// Where a ray meets the cones best.
+/// The point of a ray that is deepest inside all cones.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Meeting {
-    /// Along the ray, metres.
+    /// Distance along the ray, metres.
     pub(super) t: f32,
-    /// How far inside all cones, metres, beyond the sample's margin; where this is above 0 a better place was not looked for.
+    /// Distance inside all cones beyond the sample's margin, metres; the search stops at the first value above 0.
     pub(super) inside: f32,
 }
 
-/// A cone that holds a ray's value down, and how the value changes with the point.
+/// A cone that limits a ray's value, and the gradient of the value.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Contact {
     /// Index of the view.
@@ -94,7 +96,7 @@ impl<'a> Cones<'a> {
         }
     }
 
-    /// Origin and unit direction, vehicle frame.
+    /// Origin and unit direction of a sample's ray, vehicle frame.
     pub(super) fn ray(&self, sample: &Sample) -> (Vec3, Vec3) {
         let (rotation, center) = self.vehicle_from_camera[sample.view];
         (center, rotation * sample.direction)
@@ -106,7 +108,7 @@ impl<'a> Cones<'a> {
         self.silhouettes[view].inside_camera(rotation * p + translation)
     }
 
-    /// All cones but the ray's own, on whose edge it lies.
+    /// All trusted cones except the ray's own, on whose edge it lies.
     fn others(&self, own: usize) -> impl Iterator<Item = (usize, bool)> + '_ {
         let n = self.silhouettes.len();
         (0..2 * n)
@@ -114,7 +116,7 @@ impl<'a> Cones<'a> {
             .filter(move |&(view, mirrored)| self.trusted[view] && (mirrored || view != own))
     }
 
-    /// The smallest of all, or something below `enough` as soon as one is.
+    /// The smallest value of all cones; stops early with a value below `enough`.
     fn smallest(&self, own: usize, p: Vec3, enough: f32) -> f32 {
         let mut smallest = f32::INFINITY;
         for (view, mirrored) in self.others(own) {
@@ -126,8 +128,8 @@ impl<'a> Cones<'a> {
         smallest
     }
 
-    /// Where the ray of `sample` meets all other cones best: near `guess`, where it did before the cones were moved a
-    /// little, or anywhere.
+    /// The point of the ray of `sample` that is deepest inside all other cones. Searches near `guess`, the result
+    /// before the cones were moved slightly, or else the whole ray.
     pub(super) fn meeting(&self, sample: &Sample, guess: Option<f32>) -> Meeting {
         let (origin, direction) = self.ray(sample);
         let along = (self.middle - origin).dot(direction);
@@ -147,10 +149,10 @@ impl<'a> Cones<'a> {
             if inside > best.inside {
                 best = Meeting { t, inside };
             }
-            // Nothing nearer than this is better.
+            // No better place is nearer than this.
             t += ((best.inside - inside) / STEEPEST).max(STEP_M);
         }
-        // Between the neighbours, by halves.
+        // Refine between the neighbours by halving the step.
         let mut reach = 0.5 * STEP_M;
         while best.inside < 0.0 && reach > 5e-4 {
             for t in [best.t - reach, best.t + reach] {
@@ -164,12 +166,12 @@ impl<'a> Cones<'a> {
         best
     }
 
-    /// The cones that hold the value down at a meeting: the lowest, and the one that rises where the first falls.
-    /// The largest value of a smallest is stationary: a mixture of both with no slope along the ray.
+    /// The cones that limit the value at a meeting: the lowest, and the one that rises where the first falls.
+    /// At the maximum of a minimum, a mixture of both gradients has no slope along the ray.
     pub(super) fn contacts(&self, sample: &Sample, at: &Meeting) -> [Option<Contact>; 2] {
         let (origin, direction) = self.ray(sample);
         let p = origin + at.t * direction;
-        // A cone this much higher may be the other one: the search stops short of the crossing by this.
+        // A cone may be the other one if it is higher by no more than this, the error of the search.
         let near = at.inside + sample.margin + STEEPEST * STEP_M;
         let lowest = self
             .others(sample.view)
@@ -182,7 +184,7 @@ impl<'a> Cones<'a> {
             |cone: (usize, bool), gradient: Vec3| Some(Contact { view: cone.0, mirrored: cone.1, gradient });
         let gradient = self.gradient(first, p);
         let slope = gradient.dot(direction);
-        /// Below this a slope is none: the point may stay where it is.
+        /// Slope below which the point is stationary.
         const FLAT: f32 = 0.05;
         if slope.abs() < FLAT {
             return [contact(first, gradient), None];
@@ -202,7 +204,7 @@ impl<'a> Cones<'a> {
         let slope = |axis: Vec3| {
             let at = |s: f32| self.one(view, mirrored, p + s * axis);
             let slope = (at(SLOPE_STEP_M) - at(-SLOPE_STEP_M)) / (2.0 * SLOPE_STEP_M);
-            // At a border that cuts the silhouette the cone ends: it says nothing.
+            // At a border that cuts the silhouette the cone ends and gives no slope.
             if slope.is_finite() { slope } else { 0.0 }
         };
         Vec3::new(slope(Vec3::X), slope(Vec3::Y), slope(Vec3::Z))

@@ -1,9 +1,9 @@
 //! Self-calibration: the plane of symmetry and the cameras, corrected until the silhouettes agree.
 //!
-//! Poses that come from a detector or a tracker put the plane of symmetry some centimetres and a degree or two off,
-//! and single cameras some pixels. Masks tell: the hull of all silhouettes and of their mirrored twins must fill every
-//! mask. Where it does not, the cameras are moved, a little, until it does. What it did is in [`Calibration`];
-//! what was measured is in docs/CALIBRATION.md.
+//! Poses from a detector or a tracker put the plane of symmetry some centimetres and a degree or two off,
+//! and single cameras some pixels. The masks reveal such errors: the hull of all silhouettes and of their mirrored
+//! twins must fill every mask. Where it does not, the cameras are moved slightly until it does. [`Calibration`] reports
+//! the result; measurements are in docs/CALIBRATION.md.
 
 mod cones;
 mod correction;
@@ -25,51 +25,52 @@ use vg_geometry::{Pose, Similarity};
 use vg_scene::mask::Label;
 use vg_scene::{Mask, View};
 
-/// Scales of the loss for the plane and for all numbers, metres: first what a plane that is 3 degrees off takes away,
-/// last a few pixels.
+/// Scales of the loss for the plane and for all parameters, metres: from the deficit of a plane that is 3 degrees off
+/// down to a few pixels.
 const PLANE_SCALES_M: [f64; 2] = [0.2, 0.1];
 const ALL_SCALES_M: [f64; 2] = [0.06, 0.03];
 
-/// Edge errors are counted up to this, pixels: an occluder's cost does not drown the rest.
+/// Limit to which edge errors are clipped, pixels: an occluder must not dominate the mean.
 const MOST_EDGE_ERROR_PX: f64 = 20.0;
 
-/// Edges that miss the hull by less than this on average, pixels, agree: with exact cameras ten ray-traced vehicles
-/// miss it by 0.004 to 0.006, a sedan whose plane is yawed by a degree by 0.03.
+/// Mean edge error below which the silhouettes agree, pixels: it is 0.004 to 0.006 for ten ray-traced vehicles with
+/// exact cameras, and 0.03 for a sedan whose plane is yawed by a degree.
 const GOOD_PX: f64 = 0.015;
 
-/// A single view may lose this much, pixels.
+/// Largest allowed increase of a single view's edge error, pixels.
 const WORSE_PX: f64 = 0.25;
 
-/// Part of the held-out error that must go.
+/// Part of the held-out error that a correction must remove.
 const LEAST_GAIN: f64 = 0.25;
 
-/// More views than this do not come from a handful of photographs but from a reconstruction that has made them
-/// agree, and each asks all others.
+/// Maximum of views. More do not come from a handful of photographs but from a reconstruction that has already made
+/// them agree, and the cost is quadratic.
 const MOST_VIEWS: usize = 64;
 
-/// What the calibration hands to the stages that follow.
+/// Output of the calibration for the stages that follow.
 #[derive(Default)]
 pub(crate) struct Calibrated {
-    /// The views with corrected cameras, in a frame whose y = 0 is the plane of symmetry, and with masks that carve
-    /// nothing where an occluder cut them; `None` if all is as the caller gave it.
+    /// The views with corrected cameras, in a frame whose y = 0 is the plane of symmetry; masks that an occluder cut
+    /// carve nothing. `None` if nothing differs from the caller's views.
     pub(crate) moved: Option<Moved>,
-    /// What was done; `None` where the views cannot be calibrated.
+    /// The report; `None` if the views cannot be calibrated.
     pub(crate) report: Option<Calibration>,
-    /// Why nothing was estimated.
+    /// Reason why nothing was estimated.
     pub(crate) left_out: Option<&'static str>,
 }
 
-/// Views in a frame of their own.
+/// Corrected views.
 pub(crate) struct Moved {
+    /// The views in the corrected frame.
     pub(crate) views: Vec<View>,
-    /// The same in the caller's frame, with the caller's masks.
+    /// The views in the caller's frame, with the caller's masks.
     pub(crate) in_vehicle: Vec<View>,
-    /// Back to the caller's frame.
+    /// Transform back to the caller's frame.
     pub(crate) vehicle_from_corrected: Similarity,
 }
 
 impl Moved {
-    /// Views that were brought into the frame of a box that stands elsewhere, with the way back out of it.
+    /// Adds the transform out of the frame of a box, into which the views were brought, to `moved`.
     pub(crate) fn out_of_box(moved: Option<Self>, in_box: &[View], vehicle_from_box: &Pose) -> Self {
         let mut moved = moved.unwrap_or_else(|| Self {
             views: in_box.to_vec(),
@@ -86,27 +87,31 @@ impl Moved {
     }
 }
 
-/// Cameras farther from the vehicle than this are not corrected, metres: f32 steps along their rays are no longer small
-/// against a pixel there.
+/// Largest distance from a camera to the vehicle, metres: beyond it, f32 steps along the rays are no longer small
+/// against a pixel.
 const FARTHEST_M: f64 = 1000.0;
 
-/// Undistorted views to views whose silhouettes agree.
+/// Corrects undistorted views until their silhouettes agree.
 pub(crate) fn calibrate(views: &[View], context: &Context) -> Result<Calibrated> {
     let nothing = |why| Ok(Calibrated { moved: None, report: None, left_out: Some(why) });
     if views.iter().any(|v| v.mask.is_none()) {
-        return nothing("a view has no mask: silhouettes alone tell where the plane is");
+        return nothing("a view has no mask, and the plane can be found from silhouettes only");
     }
     if views.len() < 2 {
-        return nothing("one silhouette agrees with its mirror image wherever the plane is");
+        return nothing(
+            "there is only one view, whose silhouette agrees with its mirror image for any plane",
+        );
     }
     if views.len() > MOST_VIEWS {
-        return nothing("so many views agree already by what posed them");
+        return nothing(
+            "there are more than 64 views, which the reconstruction of their poses has already aligned",
+        );
     }
     let Some((middle, radius)) = whereabouts(views) else {
         return nothing("the views do not look at a common place near the plane y = 0");
     };
     if !views.iter().all(|v| (v.camera.center() - middle).length() <= FARTHEST_M) {
-        return nothing("a camera is so far away that its silhouette tells no error of a detector's size");
+        return nothing("a camera is more than 1000 m from the vehicle, too far to see a detector's error");
     }
     let ball = Ball { middle, radius };
     let silhouettes: Vec<Silhouette> = context.parallel(|| views.par_iter().map(Silhouette::new).collect());
@@ -138,8 +143,8 @@ pub(crate) fn calibrate(views: &[View], context: &Context) -> Result<Calibrated>
     Ok(Calibrated { moved, report: Some(report), left_out: None })
 }
 
-/// Masks that an occluder cut: where much is missing by decimetres, and without one silhouette it is not. And how the
-/// rays meet the cones of the others.
+/// Which silhouettes are trusted, and the rays' meetings with their cones. A silhouette is distrusted (an occluder cut
+/// its mask) if many rays miss by decimetres with it but not without it.
 fn trusted(
     views: &[View],
     silhouettes: &[Silhouette],
@@ -147,9 +152,9 @@ fn trusted(
     none: &Correction,
     samples: &[Sample],
 ) -> (Vec<bool>, Vec<Meeting>) {
-    /// More than any small correction explains, metres.
+    /// Deficit that no small correction explains, metres.
     const FAR_M: f64 = 0.4;
-    /// Part of the rays.
+    /// Share of such rays above which a silhouette is distrusted.
     const MANY: f64 = 0.05;
     let mut trusted = vec![true; views.len()];
     let met = |trusted: &[bool]| Problem { views, silhouettes, trusted, ball }.meetings(none, samples, &[]);
@@ -158,7 +163,7 @@ fn trusted(
     };
     let mut meetings = met(&trusted);
     let mut now = far(&meetings);
-    // Two silhouettes that contradict each other do not tell which is wrong.
+    // If only two silhouettes contradict each other, either may be wrong.
     while now > MANY && trusted.iter().filter(|t| **t).count() > 2 {
         let without = |i: usize| {
             let mut others = trusted.clone();
@@ -177,7 +182,7 @@ fn trusted(
     (trusted, meetings)
 }
 
-/// `None` if nothing differs from the caller's views.
+/// The views with the correction applied; `None` if nothing differs from the caller's views.
 fn moved(views: &[View], correction: &Correction, trusted: &[bool]) -> Result<Option<Moved>> {
     let still = correction.is_none();
     if still && trusted.iter().all(|t| *t) {
@@ -190,7 +195,7 @@ fn moved(views: &[View], correction: &Correction, trusted: &[bool]) -> Result<Op
     };
     for (i, trusted) in trusted.iter().enumerate() {
         if !trusted {
-            moved.views[i].mask = views[i].mask.as_ref().map(silent).transpose()?;
+            moved.views[i].mask = views[i].mask.as_ref().map(without_background).transpose()?;
         }
         if !still {
             let given = &views[i].camera.vehicle_from_camera;
@@ -205,13 +210,13 @@ fn moved(views: &[View], correction: &Correction, trusted: &[bool]) -> Result<Op
     Ok(Some(moved))
 }
 
-/// A mask that shows where the vehicle is but not where it is not: it carves nothing.
-fn silent(mask: &Mask) -> Result<Mask> {
+/// The mask with unknown pixels instead of background: it carves nothing.
+fn without_background(mask: &Mask) -> Result<Mask> {
     let labels = mask.labels().iter().map(|l| if *l == Label::Background { Label::Unknown } else { *l });
     Mask::new(mask.width(), mask.height(), labels.collect())
 }
 
-/// Whether a correction is better than none.
+/// Decides whether a correction is better than none.
 struct Judge<'a> {
     views: &'a [View],
     samples: &'a [Sample],
@@ -230,16 +235,16 @@ impl Judge<'_> {
         if n > 0 { sum / n as f64 } else { 0.0 }
     }
 
-    /// Why the correction is no good, or `None`.
+    /// Reason to refuse the correction, or `None`.
     fn refusal(&self, correction: &Correction, before: &[Meeting], after: &[Meeting]) -> Option<String> {
         if let Some(bound) = correction.at_limit() {
-            return Some(format!("{bound}: more than is believed of a pose"));
+            return Some(format!("{bound}, the largest error that is corrected"));
         }
         let held_out = |met: &[Meeting]| self.error(met, |s| s.held_out);
         let (had, has) = (held_out(before), held_out(after));
         if has.is_nan() || has > (1.0 - LEAST_GAIN) * had {
             return Some(format!(
-                "edges that were held out miss the hull by {has:.2} pixels instead of {had:.2}, too little gain"
+                "edges that were held out miss the hull by {has:.2} pixels instead of {had:.2}: too little improvement"
             ));
         }
         (0..self.views.len()).find_map(|view| {

@@ -1,9 +1,9 @@
-//! What the calibration did.
+//! Report of the calibration.
 
 use serde::Serialize;
 use std::fmt;
 
-/// What became of the correction.
+/// Outcome of the calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -11,11 +11,11 @@ pub enum Verdict {
     NotNeeded,
     /// The cameras were moved.
     Accepted,
-    /// A correction was estimated and thrown away: the cameras are the caller's.
+    /// A correction was estimated and discarded: the cameras are the caller's.
     Refused,
 }
 
-/// A number that stopped at the largest error that is believed of a pose.
+/// A parameter that reached the largest error that is corrected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Bound {
     Yaw,
@@ -37,52 +37,55 @@ impl fmt::Display for Bound {
     }
 }
 
-/// How a view's camera was moved about the vehicle's middle, beside the plane's motion, which all share.
+/// Motion of a view's camera about the vehicle's middle, in addition to the plane's motion, which all views share.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ViewCalibration {
     /// The view's name.
     pub name: String,
-    /// How far the picture of the vehicle's middle moved, pixels of the undistorted view.
+    /// Motion of the image of the vehicle's middle, pixels of the undistorted view.
     pub pixels: f64,
     /// Rotation, degrees.
     pub degrees: f64,
     /// Translation of the vehicle's middle, metres.
     pub metres: f64,
-    /// The corrected camera in the caller's vehicle frame, row-major `[R | t]`: where the model lines up with it.
+    /// The corrected camera in the caller's vehicle frame, row-major `[R | t]`: from it, the model lines up with the
+    /// view.
     pub vehicle_from_camera: [f64; 12],
-    /// Whether its silhouette was left out of the estimate and carves nothing: without it the others agree (an
+    /// Whether its silhouette was left out of the estimate and carves nothing, because the others agree without it (an
     /// occluder cut it).
     pub ignored: bool,
 }
 
-/// What the calibration found. Numbers are zero where nothing was moved ([`Verdict::NotNeeded`]); of a refused
-/// correction they tell what was refused.
+/// Result of the calibration. Numbers are zero if nothing was estimated ([`Verdict::NotNeeded`]); for a refused
+/// correction they describe what was refused.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Calibration {
-    /// What became of the correction.
+    /// Outcome.
     pub verdict: Verdict,
-    /// Why, in words.
+    /// Reason for the outcome, in words.
     pub why: String,
     /// Rotation about z that brings the true plane of symmetry onto y = 0, degrees.
     pub yaw_degrees: f64,
-    /// Rotation about x that does, degrees.
+    /// Rotation about x that brings the true plane onto y = 0, degrees.
     pub roll_degrees: f64,
-    /// Shift along y, at the vehicle's middle, that does, metres.
+    /// Shift along y, at the vehicle's middle, that brings the true plane onto y = 0, metres.
     pub lateral_m: f64,
-    /// corrected_from_vehicle: the plane's whole motion, row-major `[R | t]`.
+    /// The plane's whole motion corrected_from_vehicle, row-major `[R | t]`.
     pub corrected_from_vehicle: [f64; 12],
-    /// How each used view's camera was moved.
+    /// Motion of each used view's camera.
     pub views: Vec<ViewCalibration>,
-    /// Part of the masks' pixels whose rays meet the hull of all other views and of all mirrored ones, before.
+    /// Part of the masks' pixels whose rays meet the hull of all other views and of all mirrored ones, without the
+    /// correction.
     pub coverage_before: f64,
-    /// The same with the correction.
+    /// Coverage with the correction.
     pub coverage_after: f64,
-    /// Mean of what rays on the silhouettes' edges miss the hull by, before, pixels; each at most 20.
+    /// Mean distance by which rays on the silhouettes' edges miss the hull, without the correction, pixels; each is
+    /// clipped to 20.
     pub edge_error_before_px: f64,
-    /// The same with the correction.
+    /// Edge error with the correction, pixels.
     pub edge_error_after_px: f64,
-    /// The same of those rays only that the correction was not fitted to, before; `None` where nothing was fitted.
+    /// Edge error, without the correction, of the rays that it was not fitted to, pixels; `None` if nothing was fitted.
     pub held_out_before_px: Option<f64>,
-    /// The same with the correction.
+    /// Edge error, with the correction, of the rays that it was not fitted to, pixels.
     pub held_out_after_px: Option<f64>,
 }

@@ -1,21 +1,21 @@
-//! The pixels that are asked: those on the silhouettes' edges, for there the cones touch the vehicle.
+//! Sampled pixels: those on the silhouettes' edges, where the cones touch the vehicle.
 
 use glam::{DVec3, Vec3};
 use vg_scene::View;
 use vg_scene::mask::{Label, Mask};
 
-/// Edge pixels per view that are asked, at most; a view of a car has 800 to 1500 at 512 x 384.
+/// Maximum of sampled edge pixels per view; a view of a car has 800 to 1500 at 512 x 384.
 const MOST_PER_VIEW: usize = 320;
 
-/// Edge pixels of all views, at most: each asks all cones.
+/// Maximum of sampled edge pixels of all views: each is compared with all cones.
 const MOST: usize = 2400;
 
-/// How far inside the other cones an edge pixel's ray is asked to come, pixels. Its centre is half a pixel inside its
-/// own cone; the other half makes up for sampling, and for a correction that would otherwise stop at the first that
-/// misses nothing, short of the true one: known yaws are found to 0.3 degrees instead of 0.8.
+/// Required distance of an edge pixel's ray inside the other cones, pixels. Its centre is half a pixel inside its
+/// own cone. The other half makes up for sampling, and keeps the solver from stopping at the first correction without
+/// a deficit, short of the true one: known yaws are found to 0.3 degrees instead of 0.8.
 const MARGIN_PX: f64 = 1.0;
 
-/// Pixels inside the masks per view whose coverage is reported, at most.
+/// Maximum of pixels inside the mask of a view whose coverage is measured.
 const MOST_INSIDE: usize = 1000;
 
 /// A ray of one view.
@@ -23,19 +23,19 @@ const MOST_INSIDE: usize = 1000;
 pub(super) struct Sample {
     /// Index of the view.
     pub(super) view: usize,
-    /// Unit, camera axes.
+    /// Unit direction, camera axes.
     pub(super) direction: Vec3,
-    /// How far inside the other cones the ray is asked to come, metres.
+    /// Required distance of the ray inside the other cones, metres.
     pub(super) margin: f32,
-    /// The correction is not fitted to this one: it judges the fit.
+    /// Whether the sample validates the correction instead of fitting it.
     pub(super) held_out: bool,
 }
 
-/// Edge pixels of all views, spread evenly. Squares of a sixteenth of the picture's width take turns in fitting and
-/// judging: pixels beside one another say the same, pixels a square apart do not.
+/// Edge pixels of all views, spread evenly. Squares of a sixteenth of the picture's width alternate between fitting and
+/// validation: adjacent pixels are correlated, pixels a square apart are not.
 pub(super) fn edges(views: &[View], middle: DVec3) -> Vec<Sample> {
     let most = MOST_PER_VIEW.min(MOST / views.len().max(1)).max(16);
-    let of_view = |(view, v): (usize, &View)| {
+    let edges_in = |(view, v): (usize, &View)| {
         let mask = v.mask.as_ref().expect("calibrated views have masks");
         let square = (v.camera.width / 16).max(1);
         let pixels = edge_pixels(mask);
@@ -50,19 +50,19 @@ pub(super) fn edges(views: &[View], middle: DVec3) -> Vec<Sample> {
             })
             .collect::<Vec<_>>()
     };
-    views.iter().enumerate().flat_map(of_view).collect()
+    views.iter().enumerate().flat_map(edges_in).collect()
 }
 
 /// Pixels of the masks, spread evenly over each.
 pub(super) fn insides(views: &[View]) -> Vec<Sample> {
-    let of_view = |(view, v): (usize, &View)| {
+    let insides_in = |(view, v): (usize, &View)| {
         let mask = v.mask.as_ref().expect("calibrated views have masks");
         let pixels: Vec<[u32; 2]> = pixels(mask).filter(|&[x, y]| mask.is_vehicle(x, y)).collect();
         thinned(&pixels, MOST_INSIDE)
             .map(|[x, y]| Sample { view, direction: direction(v, x, y), margin: 0.0, held_out: false })
             .collect::<Vec<_>>()
     };
-    views.iter().enumerate().flat_map(of_view).collect()
+    views.iter().enumerate().flat_map(insides_in).collect()
 }
 
 fn pixels(mask: &Mask) -> impl Iterator<Item = [u32; 2]> {
@@ -70,7 +70,7 @@ fn pixels(mask: &Mask) -> impl Iterator<Item = [u32; 2]> {
     (0..height).flat_map(move |y| (0..width).map(move |x| [x, y]))
 }
 
-/// Vehicle pixels beside background. Beside the border of the picture or an unknown pixel there is no edge.
+/// Vehicle pixels next to background. The border of the picture and unknown pixels make no edge.
 fn edge_pixels(mask: &Mask) -> Vec<[u32; 2]> {
     let (width, height) = (mask.width(), mask.height());
     let labels = mask.labels();
@@ -86,7 +86,7 @@ fn edge_pixels(mask: &Mask) -> Vec<[u32; 2]> {
         .collect()
 }
 
-/// About `most` of them, evenly.
+/// At most `most` of the pixels, evenly.
 fn thinned(pixels: &[[u32; 2]], most: usize) -> impl Iterator<Item = [u32; 2]> {
     let n = pixels.len().min(most);
     (0..n).map(move |k| pixels[k * pixels.len() / n])

@@ -1,5 +1,5 @@
-//! The most probable correction: Gauss-Newton on what is missing along the rays, damped as by Levenberg and
-//! Marquardt, with a loss that gives up on what no small correction can explain.
+//! The most probable correction: Levenberg-Marquardt on the rays' deficits, with a robust loss that ignores deficits
+//! that no small correction can explain.
 
 use super::cones::{Ball, Cones, Meeting};
 use super::correction::{CAMERA, Correction, PLANE};
@@ -10,21 +10,21 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 use vg_scene::View;
 
-/// Noise of a deficit, metres: a mask is good to about a pixel.
+/// Noise of a deficit, metres: a mask is accurate to about a pixel.
 const NOISE_M: f64 = 0.01;
 
-/// How many independent observations two views make, whatever the number of pixels that are asked: neighbours on an
-/// edge err together. Two cones touch at a tangent plane above and one below, either camera sees both, and the twin
-/// of one camera makes as many again: 8. Each is a stretch of edge rather than a point.
+/// The number of independent observations of two views, whatever the number of sampled pixels: errors of neighbours on
+/// an edge are correlated. Two cones touch at a tangent plane above and one below, either camera sees both, and the
+/// twin of one camera doubles that: 8. Each is a stretch of edge rather than a point.
 const OBSERVATIONS_PER_PAIR: f64 = 16.0;
 
-/// Steps at most for each scale of the loss.
+/// Maximum of steps for each scale of the loss.
 const STEPS: usize = 6;
 
-/// A step that gains less than this part of the cost is the last.
+/// Part of the cost below which a step's gain ends the iteration.
 const ENOUGH: f64 = 0.01;
 
-/// Everything that stays the same while cameras move.
+/// The part of the problem that does not depend on the correction.
 pub(super) struct Problem<'a> {
     pub(super) views: &'a [View],
     pub(super) silhouettes: &'a [Silhouette],
@@ -32,12 +32,12 @@ pub(super) struct Problem<'a> {
     pub(super) ball: Ball,
 }
 
-/// Which numbers may move.
+/// Parameters that the solver changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Free {
-    /// The plane's.
+    /// The plane's parameters.
     Plane,
-    /// The plane's and the cameras'.
+    /// The parameters of the plane and of all cameras.
     All,
 }
 
@@ -46,16 +46,16 @@ impl Problem<'_> {
         Cones::new(self.silhouettes, self.trusted, self.views, correction, self.ball)
     }
 
-    /// Where each ray meets the cones. `before` are the same rays' meetings with cameras that were hardly different:
-    /// better ones are looked for near them. Without any, all along the rays.
+    /// Each ray's meeting with the cones. `before` are the rays' meetings for a slightly different correction, near
+    /// which better ones are searched for; without any, the whole rays are searched.
     pub(super) fn meetings(&self, c: &Correction, samples: &[Sample], before: &[Meeting]) -> Vec<Meeting> {
         let cones = self.cones(c);
-        let of = |(k, sample): (usize, &Sample)| cones.meeting(sample, before.get(k).map(|m| m.t));
-        samples.par_iter().enumerate().map(of).collect()
+        let meeting = |(k, sample): (usize, &Sample)| cones.meeting(sample, before.get(k).map(|m| m.t));
+        samples.par_iter().enumerate().map(meeting).collect()
     }
 
-    /// The correction nearest to `start` that the rays of `samples` ask for; `scales` of the loss in metres, one
-    /// after another.
+    /// Fits the correction to the rays of `samples`, from `start` on, with the `scales` of the loss (metres) one after
+    /// another.
     pub(super) fn fit(
         &self,
         start: &Correction,
@@ -84,7 +84,7 @@ impl Problem<'_> {
         correction
     }
 
-    /// What one observation of this many is worth.
+    /// Weight of each of the samples.
     fn weight(&self, samples: &[Sample]) -> f64 {
         let n = self.views.len() as f64;
         let observations = OBSERVATIONS_PER_PAIR * 0.5 * n * (n - 1.0);
@@ -120,7 +120,7 @@ impl Problem<'_> {
             let moved = correction.moved(&step);
             let met = self.meetings(&moved, samples, meetings);
             let lower = self.cost(&moved, samples, &met, scale);
-            // A cost that is no number is not lower.
+            // A NaN cost is not lower.
             if lower < cost {
                 *damping = (*damping * 0.2).max(1e-6);
                 return Some((moved, met, lower));
@@ -156,7 +156,7 @@ impl Problem<'_> {
             .zip(meetings)
             .map(|(sample, m)| (deficit(m) > 0.0).then(|| Row::new(&cones, middle, sample, m, free)))
             .collect();
-        // In the samples' order, whatever the threads.
+        // Summed in the samples' order, whatever the number of threads.
         for (row, meeting) in rows.iter().zip(meetings) {
             let Some(row) = row else { continue };
             let missing = deficit(meeting);
@@ -175,7 +175,7 @@ impl Problem<'_> {
     }
 }
 
-/// What is missing for the ray to meet all cones, metres.
+/// Distance by which the ray fails to meet all cones, metres; 0 if it meets them.
 pub(super) fn deficit(meeting: &Meeting) -> f64 {
     f64::from(-meeting.inside).max(0.0)
 }
@@ -186,12 +186,12 @@ fn loss(r: f64, scale: f64) -> f64 {
     r2 / (1.0 + r2 / (scale * scale))
 }
 
-/// Half its derivative over r.
+/// Derivative of [`loss`] over 2 r.
 fn robust_weight(r: f64, scale: f64) -> f64 {
     (1.0 + r * r / (scale * scale)).powi(-2)
 }
 
-/// How the value at a ray's meeting changes with the numbers: index and derivative, each index once.
+/// Derivatives of the value at a ray's meeting: index of the parameter and derivative, each index once.
 struct Row(Vec<(usize, f64)>);
 
 impl Row {
@@ -208,7 +208,7 @@ impl Row {
         row
     }
 
-    /// The value changes by `gradient` times the motion of `p`, which moves with the camera of `view`.
+    /// Adds the derivatives of `gradient` times the motion of `p`, which moves with the camera of `view`.
     fn push(&mut self, middle: Vec3, view: usize, p: Vec3, gradient: Vec3, free: Free) {
         let arm = p - middle;
         self.add(0, arm.cross(gradient).z);
@@ -217,7 +217,7 @@ impl Row {
         if free == Free::Plane {
             return;
         }
-        // The plane's own turn, a few degrees between the two frames, does not matter to a step.
+        // The rotation of a few degrees between the two frames is negligible for a step.
         let turn = arm.cross(gradient);
         let first = PLANE + CAMERA * view;
         for axis in 0..3 {

@@ -1,7 +1,7 @@
 //! Colour of a surfel from all views that see it, as spherical harmonics.
 //!
 //! Geometry is never exact and paint is glossy, so the same place looks different from different sides. A mean
-//! over views blurs, one view alone is wrong seen from elsewhere; spherical harmonics can hold both: seen from
+//! over views blurs, and one view alone is wrong from other directions. Spherical harmonics can represent both: from
 //! near view j's direction the surfel shows view j's colour. The coefficients are the posterior mean of a
 //! Gaussian process on the sphere: colour = mean + sum over bands l >= 1 with equal prior power per band, and
 //! noise inversely proportional to each view's weight. With n views this is one n x n solve per surfel.
@@ -9,13 +9,13 @@
 use glam::Vec3;
 use vg_splat::gaussians::sh;
 
-/// Most views that take part in one surfel's colour: about as many as three bands have coefficients.
+/// Maximum of views that take part in one surfel's colour: about the number of coefficients of three bands.
 pub const MAX_SAMPLES: usize = 16;
 
 /// Noise variance of a view of weight 1 over the prior variance of the view-dependent part.
 const NOISE: f64 = 0.3;
 
-/// What one view shows of a surfel.
+/// A surfel's colour in one view.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sample {
     /// Unit direction from the camera to the surfel, vehicle frame.
@@ -28,7 +28,7 @@ pub struct Sample {
 
 /// SH coefficients `[16][3]` up to `degree` that show the samples' colours in their directions.
 pub fn fit(samples: &[Sample], degree: u8) -> [f32; 48] {
-    // Working memory is cleared for every surfel; few have many samples.
+    // The buffers are cleared for every surfel; few surfels have many samples.
     match samples.len() {
         0..=4 => fit_up_to::<4>(samples, degree),
         5..=8 => fit_up_to::<8>(samples, degree),

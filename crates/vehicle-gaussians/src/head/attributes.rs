@@ -1,4 +1,4 @@
-//! The paper's activations: 38 raw channels of one pixel to one Gaussian (method section 3).
+//! The paper's activations: from the 38 raw channels of one pixel to one Gaussian (method section 3).
 //!
 //! a = [o, dp, q, s, h]: opacity alpha = sigmoid(o + 3); centre mu = p_v + R_vc dp (eq. `offset`); rotation
 //! q / |q| in the vehicle frame; scale clip(activation(s), 1e-10, 3) metres (eq. `scale`); colour h with
@@ -16,7 +16,7 @@ pub const SH_DEGREE: u8 = 2;
 /// sigma_min and sigma_max, metres.
 pub const SCALE_BOUNDS: [f32; 2] = [1e-10, 3.0];
 
-/// What makes a raw scale positive (the paper's ablation; softplus is its choice).
+/// Function that makes a raw scale positive (the paper's ablation; it uses softplus).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum ScaleActivation {
     /// ln(1 + e^s)
@@ -72,8 +72,8 @@ pub fn activate(
     };
     let mut sh = [0.0; 27];
     sh.copy_from_slice(&raw[11..]);
-    for (coefficient, residual) in sh.iter_mut().zip(sh::from_rgb(rgb)) {
-        *coefficient += residual;
+    for (residual, base) in sh.iter_mut().zip(sh::from_rgb(rgb)) {
+        *residual += base;
     }
     Activated {
         mean: mean.to_array(),
@@ -87,7 +87,7 @@ pub fn activate(
 /// clip(activation(s), 1e-10, 3), metres.
 pub fn scale(raw: f32, activation: ScaleActivation) -> f32 {
     let positive = match activation {
-        // ln(1 + e^s) = max(s, 0) + ln(1 + e^-|s|) overflows nowhere and keeps small values exact.
+        // ln(1 + e^s) = max(s, 0) + ln(1 + e^-|s|) never overflows and keeps small values accurate.
         ScaleActivation::Softplus => raw.max(0.0) + (-raw.abs()).exp().ln_1p(),
         ScaleActivation::Sigmoid => sigmoid(raw),
         ScaleActivation::Relu => raw.max(0.0),
@@ -96,7 +96,7 @@ pub fn scale(raw: f32, activation: ScaleActivation) -> f32 {
 }
 
 fn sigmoid(x: f32) -> f32 {
-    // e^-x may be infinite: 1 / inf = 0 is the right answer.
+    // e^-x may be infinite: 1 / inf = 0 is the correct limit.
     1.0 / (1.0 + (-x).exp())
 }
 

@@ -1,5 +1,5 @@
-//! The paper's head: a network in an ONNX file that gives 38 numbers per pixel (paper sec. "Gaussian Attribute
-//! Estimation"), in the contract "gaussian head", version 1 (docs/ONNX.md).
+//! The paper's head: a network in an ONNX file that predicts 38 numbers per pixel (paper sec. "Gaussian Attribute
+//! Estimation"), by the contract "gaussian head", version 1 (docs/ONNX.md).
 
 use super::GaussianHead;
 use super::attributes::{Activated, CHANNELS, Offset, SH_DEGREE, ScaleActivation, activate};
@@ -19,7 +19,7 @@ use vg_splat::gaussians::buffer::Gaussian;
 pub struct NetworkHead {
     model: Model,
     contract: Contract,
-    /// Colours above this degree are left out.
+    /// Highest SH degree of the colour.
     sh_degree: u8,
 }
 
@@ -27,7 +27,7 @@ pub struct NetworkHead {
 struct Contract {
     activation: ScaleActivation,
     offset: Offset,
-    /// Sides of its pictures are multiples of this.
+    /// Sides of its input pictures are multiples of this.
     multiple: u32,
     takes_intrinsics: bool,
     /// Index among the outputs.
@@ -35,14 +35,14 @@ struct Contract {
 }
 
 impl NetworkHead {
-    /// For a model that keeps the contract; [`vg_geometry::Error::Format`] says what breaks it. Colour up to SH degree
+    /// A head that runs `model`; [`vg_geometry::Error::Format`] names what breaks the contract. Colour up to SH degree
     /// `sh_degree`, at most 2.
     pub fn new(model: Model, sh_degree: u8) -> Result<Self> {
         let contract = Contract::read(model.ports()).map_err(|b| model.broken(b.field, b.reason))?;
         Ok(Self { model, contract, sh_degree: sh_degree.min(SH_DEGREE) })
     }
 
-    /// Its offsets are left out, whatever its file says (the paper's ablation).
+    /// Ignores the network's offsets, whatever its metadata (the paper's ablation).
     pub fn without_offset(mut self) -> Self {
         self.contract.offset = Offset::Ignored;
         self
@@ -55,7 +55,7 @@ impl Contract {
         if let Some(prior) = ports.metadata.get("vg.prior") {
             return Err(Broken::new(
                 "metadata vg.prior",
-                format!("{prior:?}: a geometry prior, no Gaussian head"),
+                format!("{prior:?}: a geometry prior, not a Gaussian head"),
             ));
         }
         ports.required("vg.head")?;
@@ -69,10 +69,10 @@ impl Contract {
         let offsets = [("applied", Offset::Applied), ("ignored", Offset::Ignored)];
         let offset = ports.one_of("vg.offset", &offsets, Some(Offset::Applied))?;
         let multiple = ports.count("vg.size_multiple", 1)?;
-        // One view at a time is shown, as large as it is.
+        // The network runs on one view at a time, at the view's own size.
         let images = ports.required_input("images", &[Some(1), Some(3), None, None])?;
         if images[2].is_some() || images[3].is_some() {
-            return Err(Broken::new("input images", "of a fixed size; allowed: any height and width"));
+            return Err(Broken::new("input images", "a fixed size; allowed: any height and width"));
         }
         ports.required_input("depth", &[Some(1), None, None])?;
         let takes_intrinsics = ports.input("intrinsics", &[Some(1), Some(3), Some(3)])?.is_some();
@@ -113,7 +113,8 @@ impl GaussianHead for NetworkHead {
                         sh0: [g.sh[0], g.sh[1], g.sh[2]],
                     };
                     if !gaussian.is_storable() {
-                        let reason = format!("a centre at {:?} m came of a run; allowed: finite", g.mean);
+                        let reason =
+                            format!("the network returned a centre at {:?} m; allowed: finite", g.mean);
                         return Err(self.model.broken("output attributes", reason));
                     }
                     all.push_with_sh(&gaussian, &g.sh[..coefficients]);
@@ -133,7 +134,7 @@ struct Frame {
 }
 
 impl NetworkHead {
-    /// Shows a view to the network, padded right and below with zeros.
+    /// Runs the network on a view, padded on the right and at the bottom with zeros.
     fn run(&self, view: &View, geometry: &Geometry, i: usize) -> Result<Frame> {
         let padded = |side: u32| side.next_multiple_of(self.contract.multiple) as usize;
         let (width, height) = (padded(view.camera.width), padded(view.camera.height));
@@ -142,7 +143,7 @@ impl NetworkHead {
         let own = view.camera.width as usize;
         for (pixel, (color, z)) in view.image.pixels().iter().zip(geometry.depths[i].depth()).enumerate() {
             let at = pixel / own * width + pixel % own;
-            // The network measures depth from the mean of what it is given.
+            // The network subtracts the mean depth of its input: background must not be in it.
             let vehicle = view.mask.as_ref().is_none_or(|m| m.labels()[pixel] == Label::Vehicle);
             depth[at] = if vehicle { *z } else { 0.0 };
             for (c, value) in color.iter().enumerate() {

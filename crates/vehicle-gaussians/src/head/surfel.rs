@@ -1,8 +1,8 @@
-//! The weight-free head: one flat Gaussian per kept pixel, lying in the surface the depth shows.
+//! The weight-free head: one flat Gaussian per kept pixel, in the surface that the depth map describes.
 //!
 //! In-plane it is as large as the pixel's footprint on the surface, so that its projection into its own view
 //! is a circle of [`FOOTPRINT_SIGMA_PX`] whatever the obliquity; across the surface it is thin. Its colour
-//! comes from all views that see the place (see [`super::appearance`]); where no other view sees it, it is the
+//! comes from all views that see the place (see [`super::appearance`]); if no other view sees it, it is the
 //! pixel's own, RGB2SH(I).
 
 use super::GaussianHead;
@@ -17,21 +17,21 @@ use vg_scene::visibility::{Observer, SURFACE_M, Sight};
 use vg_splat::gaussians::buffer::Gaussian;
 use vg_splat::gaussians::{Gaussians, sh};
 
-/// Standard deviation of a surfel seen from its own camera, pixels. With the render's own blur of 0.3 px^2
+/// Standard deviation of a surfel seen from its own camera, pixels. With the renderer's blur of 0.3 px^2,
 /// neighbours one pixel apart overlap to a smooth surface without spilling over the silhouette; at twice the
-/// magnification, where the blur counts less, the surface is still closed.
+/// magnification, where the blur matters less, the surface is still closed.
 pub const FOOTPRINT_SIGMA_PX: f32 = 0.5;
 
 /// Thickness over in-plane size.
 const THICKNESS: f32 = 0.2;
 
-/// Footprints are not stretched further than this along the tilt: a surface seen at a graze is a guess.
+/// Maximum stretch of a footprint along the tilt: the slope of a surface seen at a grazing angle is uncertain.
 const MAX_STRETCH: f32 = 4.0;
 
 /// Peak opacity.
 const OPACITY: f32 = 0.9;
 
-/// A view that shows a place at a fraction of the resolution still tells its colour.
+/// Minimum weight of a view: its colour is useful even at a fraction of the resolution.
 const MIN_WEIGHT: f32 = 0.3;
 
 /// See the module's documentation.
@@ -41,7 +41,7 @@ pub struct SurfelHead {
 }
 
 impl SurfelHead {
-    /// With colour up to SH degree `sh_degree`, 0 to 3.
+    /// A head with colour up to SH degree `sh_degree`, 0 to 3.
     pub fn new(sh_degree: u8) -> Self {
         Self { sh_degree }
     }
@@ -85,7 +85,7 @@ impl GaussianHead for SurfelHead {
 }
 
 impl SurfelHead {
-    /// The colour that the surfel's own view and all others that see its place agree on.
+    /// The colour fitted to the surfel's own view and to all others that see its place.
     fn color(&self, observers: &[Observer], own: usize, surfel: &Gaussian, normal: Vec3) -> [f32; 48] {
         let place = Vec3::from_array(surfel.mean);
         let own_resolution = observers[own].resolution(place, normal).max(1e-3);
@@ -141,6 +141,6 @@ fn surfel(view: &View, geometry: &Geometry, i: usize, pixel: usize) -> Option<(G
         opacity: OPACITY,
         sh0: sh::from_rgb(view.image.pixels()[pixel].map(|c| f32::from(c) / 255.0)),
     };
-    // Depth of 1e-40 m, or a principal point 1e9 px away, leave what a Gaussian can hold.
+    // A depth of 1e-40 m or a principal point 1e9 px away exceeds the range of a Gaussian.
     surfel.is_storable().then(|| (surfel, vehicle_from_camera * normal))
 }

@@ -1,7 +1,7 @@
-//! Models that other programs made, brought to the vehicle's frame: to be measured by the same measures.
+//! Models from other programs, transformed to the vehicle's frame so that they can be evaluated in the same way.
 //!
-//! [`merge_views`] is for programs that answer a cloud of Gaussians for each photograph, background included, in the
-//! frame of the cameras (Depth Anything 3); [`place_object`] for those that answer one object of no known size and
+//! [`merge_views`] is for programs that return Gaussians for each photograph, background included, in the
+//! frame of the cameras (Depth Anything 3); [`place_object`] is for programs that return one object of unknown size and
 //! heading (TRELLIS).
 
 mod object;

@@ -1,7 +1,7 @@
-//! One object of no known size, place and heading: fitted to a scan, front and back told apart by photographs.
+//! Registration of one object of unknown size, position and heading to a scan; photographs distinguish front and back.
 //!
-//! A similarity with scale from four headings, each by trimmed ICP on pairs in both directions: pairs from the object
-//! to the scan alone are shortest for an object that has shrunk into it.
+//! A similarity with scale is fitted from four headings, each by trimmed ICP on pairs in both directions: pairs from
+//! the object to the scan alone would be shortest for an object that has shrunk into the scan.
 
 use crate::metrics::{on_white, psnr};
 use glam::{DMat3, DVec3};
@@ -13,50 +13,51 @@ use vg_scene::{Cloud, View};
 use vg_splat::Gaussians;
 use vg_splat::render::{CpuRenderer, RenderOptions, Renderer};
 
-/// The object's own way up.
+/// The up axis of the object's frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Up {
     /// z.
     Z,
-    /// -y, as TRELLIS writes its PLY: (x, y, z) is (x, -z, y) in the file.
+    /// -y, as in PLY files of TRELLIS: (x, y, z) is (x, -z, y) in the file.
     MinusY,
 }
 
-/// Where an object was put.
+/// An object in the vehicle's frame.
 #[derive(Clone, Debug)]
 pub struct Placed {
-    /// In the vehicle's frame, metres.
+    /// Gaussians in the vehicle's frame, metres.
     pub gaussians: Gaussians,
-    /// From the object's own frame.
+    /// Similarity from the object's own frame.
     pub vehicle_from_object: Similarity,
     /// Mean distance of the pairs that were used, metres.
     pub residual_m: f64,
 }
 
-/// Headings that are tried.
+/// The number of headings tried.
 const HEADINGS: u32 = 4;
 
-/// Gaussians fainter than this have no place on the surface.
+/// Minimum opacity of Gaussians that represent the surface.
 const FAINTEST: f32 = 0.1;
 
-/// At most so many points of either side.
+/// Maximum of points on either side.
 const MOST_POINTS: usize = 6000;
 
-/// Of the pairs of each direction, the nearest part that counts: strays, the underside and interiors have no partner.
+/// Share of the nearest pairs that is used in each direction: stray points, the underside and interiors have no
+/// partner.
 const KEPT_SHARE: f64 = 0.8;
 
 const STEPS: usize = 80;
 
-/// A heading that is not this much worse than the best is told apart by the photographs.
+/// Ratio to the best residual up to which the photographs decide between headings.
 const NEARLY: f64 = 1.5;
 
-/// Of each side and axis, the part that is taken for strays where extents are measured.
+/// Share of points that is ignored at each end of each axis when extents are measured.
 const STRAYS: f64 = 0.02;
 
-/// Fits `object` to `scan`, which is in the vehicle's frame, metres; `views` tell front from back.
+/// Fits `object` to `scan`, which is in the vehicle's frame, metres; `views` distinguish front and back.
 ///
 /// # Errors
-/// Fewer than 100 points or Gaussians, and a fit that ends nowhere.
+/// Fewer than 100 points or Gaussians, and an object that does not fit.
 pub fn place_object(object: &Gaussians, up: Up, scan: &Cloud, views: &[View]) -> Result<Placed> {
     let upright = Similarity { rotation: rotation(up), ..Similarity::IDENTITY };
     let model: Vec<DVec3> = object
@@ -93,23 +94,24 @@ pub fn place_object(object: &Gaussians, up: Up, scan: &Cloud, views: &[View]) ->
     }
     best.map(|(_, placed)| placed).ok_or_else(|| Error::Reconstruction {
         stage: "import",
-        reason: "the object fits the scan nowhere".into(),
+        reason: "the object does not fit the scan for any heading; check the scan and the object's up axis"
+            .into(),
     })
 }
 
-/// Fewer points are no shape.
+/// Minimum of points on either side.
 const FEWEST: usize = 100;
 
-/// Takes the object's axes to z up.
+/// Rotation from the object's axes to z up.
 fn rotation(up: Up) -> DMat3 {
     match up {
         Up::Z => DMat3::IDENTITY,
-        // (X, Y, Z) of the file is (X, Z, -Y): columns are where its axes go.
+        // (X, Y, Z) of the file is (X, Z, -Y): the columns are the images of the file's axes.
         Up::MinusY => DMat3::from_cols(DVec3::X, DVec3::new(0.0, 0.0, -1.0), DVec3::new(0.0, 1.0, 0.0)),
     }
 }
 
-/// Points to be paired, and what finds the nearest of them.
+/// Points of one side, with a search tree.
 struct Side {
     points: Vec<DVec3>,
     tree: Nearest,
@@ -139,13 +141,13 @@ impl Side {
     }
 }
 
-/// Where one heading ended.
+/// Result of one heading.
 struct Fit {
     similarity: Similarity,
     residual_m: f64,
 }
 
-/// Points of the object in its frame, of the scan, and their squared distance, square metres.
+/// A point of the object in its frame, a point of the scan, and their squared distance, square metres.
 type Pair = (DVec3, DVec3, f64);
 
 fn fit(model: &Side, scan: &Side, heading: f64) -> Fit {
@@ -166,7 +168,7 @@ fn fit(model: &Side, scan: &Side, heading: f64) -> Fit {
     fit
 }
 
-/// The nearest of the scan for each of the object and the other way round, without the farthest of each.
+/// Nearest neighbours in both directions, without the farthest pairs of each.
 fn pairs(model: &Side, scan: &Side, s: &Similarity) -> Vec<Pair> {
     let inverse = s.inverse();
     let forth = model.points.par_iter().map(|p| {
@@ -188,7 +190,7 @@ fn trimmed(mut pairs: Vec<Pair>) -> Vec<Pair> {
     pairs
 }
 
-/// Mean PSNR in the views, dB; 0 without any.
+/// Mean PSNR over the views, dB; 0 without any.
 fn likeness(gaussians: &Gaussians, views: &[View]) -> Result<f64> {
     let (renderer, options) = (CpuRenderer::new(), RenderOptions::default());
     let mut sum = 0.0;

@@ -5,7 +5,7 @@ use vg_geometry::progress::Context;
 use vg_geometry::{Error, Result};
 use vg_scene::View;
 
-/// Hands the views' own depth on.
+/// Returns the depth that the views carry.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct GivenDepth;
 
@@ -20,7 +20,7 @@ impl DepthPrior for GivenDepth {
                 Error::argument(
                     format!("{}.depth", view.argument(i)),
                     "none",
-                    "metric depth for every used view (of a scene on disk depth_file_path, or depth/{stem,name,stem_depth,stem.depth}.{png,npy,pfm,exr}, or the same in depths/), or another prior",
+                    "metric depth for every used view (for a scene on disk: depth_file_path, or depth/{stem,name,stem_depth,stem.depth}.{png,npy,pfm,exr}, or these names in depths/), or another prior",
                 )
             })
         };

@@ -2,13 +2,13 @@
 //!
 //! A mirrored camera sees the mirrored vehicle, and the vehicle is its own mirror image: N one-sided
 //! silhouettes carve like 2N all round. The hull is the zero level of F(p) = min over all 2N views of the
-//! signed distance from p's pixel to the silhouette's edge, in metres at p's depth. A view says nothing of
-//! points behind it, nor beyond a border of its picture that cuts the vehicle, so such a mask carves nothing there.
+//! signed distance from p's pixel to the silhouette's edge, in metres at p's depth. A mask carves nothing behind
+//! its camera, and nothing beyond a border of its picture that cuts the vehicle.
 //!
-//! Where two cones cross, the hull has a crease that the vehicle inside it has not: F is smoothed before its zero
-//! level is taken. And the vehicle touches its hull at the rims of the silhouettes only; elsewhere it lies
+//! Where two cones cross, the hull has a crease that the vehicle does not have: F is smoothed before its zero
+//! level is taken. The vehicle touches its hull only at the rims of the silhouettes; elsewhere it lies
 //! decimetres inside. The surface is drawn in everywhere and then raised again, smoothly, where the rays of
-//! vehicle pixels pass it by, so that every mask is filled. Measured points, where there are some, pull it to them.
+//! vehicle pixels miss it, so that every mask is filled. Measured points, if there are any, pull it towards them.
 
 use super::volume::{
     Field, KnownBox, Silhouette, fill_masks, find_box, fit_cloud, inside_all, inside_box, march,
@@ -25,15 +25,15 @@ pub(crate) const FINEST_VOXEL_M: f64 = 0.02;
 /// Grid points along the longest side; bounds memory at about 2 M points for a car's proportions.
 const MOST_POINTS: f64 = 224.0;
 
-/// Reach of the smoothing, metres: on ten ray-traced vehicles 0.05 gains 0.3 dB on the unseen side over none, and
-/// no more from 0.075 on, where depth begins to lose.
+/// Radius of the smoothing, metres: on ten ray-traced vehicles 0.05 gains 0.3 dB on the unseen side over no
+/// smoothing; from 0.075 on it gains no more and depth gets worse.
 const SMOOTHING_M: f32 = 0.05;
 
 /// How far the smoothed hull is drawn in before the masks are filled again, metres: on ten ray-traced vehicles
 /// 0.03 to 0.05 gain most on the unseen side, see docs/SHAPE.md.
 const INSET_M: f32 = 0.05;
 
-/// What the hull's ends are off by, metres: a little more than its surface on average, see docs/SHAPE.md.
+/// Expected error of the hull's ends, metres: a little more than its surface's on average, see docs/SHAPE.md.
 const END_ERROR_M: f64 = 0.1;
 
 /// See the module's documentation.
@@ -41,9 +41,9 @@ const END_ERROR_M: f64 = 0.1;
 pub struct HullPrior {
     /// The vehicle's box, as far as the caller knows it.
     pub known_box: Option<KnownBox>,
-    /// Points measured on the vehicle, where there are some.
+    /// Points measured on the vehicle, if there are any.
     pub cloud: Option<Cloud>,
-    /// Grid spacing, metres, where a coarser one than the finest useful one will do.
+    /// Grid spacing, metres, if coarser than the finest useful one.
     pub voxel_m: Option<f64>,
 }
 
@@ -80,14 +80,14 @@ impl DepthPrior for HullPrior {
     }
 }
 
-/// An error for a view without silhouette.
+/// Returns an error if a view has no silhouette.
 pub(super) fn require_masks(views: &[View]) -> Result<()> {
     for (i, view) in views.iter().enumerate() {
         if view.mask.as_ref().is_none_or(|m| m.vehicle_pixels() == 0) {
             return Err(Error::argument(
                 format!("{}.mask", view.argument(i)),
                 if view.mask.is_some() { "no vehicle pixel" } else { "none" },
-                "a mask with the vehicle, the caller's own or a segmentation network's (mask model): without depth there is nothing but silhouettes",
+                "a mask that shows the vehicle, your own or from a segmentation network (mask model): without depth the shape comes from the silhouettes alone",
             ));
         }
     }

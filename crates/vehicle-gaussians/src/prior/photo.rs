@@ -1,15 +1,14 @@
-//! Photo-consistency: where the surface would have to be for views, and the mirrored twins of views, to show the
-//! same.
+//! Photo-consistency: moves the surface to where views, and the mirrored twins of views, agree.
 //!
-//! A small patch of the present surface is moved along its normal; where two views' pictures of it agree best, by
-//! zero-mean normalised cross-correlation at two scales, the surface should be. Gloss, repetition and plain paint
-//! make this wrong more often than right, so an answer counts only if the agreement is high, far better than
-//! elsewhere on the way, and the same at both scales.
+//! A small patch of the present surface is moved along its normal to where two views' pictures of it agree best, by
+//! zero-mean normalised cross-correlation at two scales. Gloss, repetition and plain paint make this wrong more
+//! often than right, so a match counts only if the agreement, summed over both scales, is high and far better than
+//! elsewhere on the path.
 
 use super::Geometry;
 use super::normals::normals;
 use super::volume::points::median_distance;
-use super::volume::relax::{Ceiling, HULL_SLACK_M, Pull, Relaxation, Wish, relax};
+use super::volume::relax::{Ceiling, HULL_SLACK_M, Pull, PullKind, Relaxation, relax};
 use super::volume::{Field, march};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -18,51 +17,51 @@ use vg_geometry::Result;
 use vg_scene::View;
 use vg_scene::visibility::{Observer, Sight};
 
-/// Every so many pixels along rows and columns one patch.
+/// Distance between patches along rows and columns, pixels.
 const EVERY_PX: usize = 5;
 
 /// Patches are this many samples wide and high.
 const SIDE: usize = 7;
 const SAMPLES: usize = SIDE * SIDE;
 
-/// The way along the normal, metres to either side, and its step.
+/// Length of the search along the normal to either side, and its step, metres.
 const REACH_M: f32 = 0.09;
 const STEP_M: f32 = 0.01;
 const STEPS: usize = 19;
 
-/// Distance of a patch's samples at either scale, footprints of the view's pixel.
+/// Spacing of a patch's samples at each scale, in pixel footprints.
 const SPACING: [f32; 2] = [1.2, 2.6];
 
-/// Agreement that counts.
+/// Lowest correlation of a match.
 const AGREEMENT: f32 = 0.8;
 
-/// The best place must beat all places farther away than [`NEAR_STEPS`] by this much.
+/// Margin by which the best place must beat all places farther away than [`NEAR_STEPS`].
 const MARGIN: f32 = 0.06;
 const NEAR_STEPS: usize = 3;
 
-/// A patch with less contrast than this (standard deviation, of 1) shows nothing.
+/// Lowest contrast of a patch (standard deviation of brightness from 0 to 1).
 const CONTRAST: f32 = 0.02;
 
-/// Surfaces seen at a flatter angle are not looked at: cosine.
+/// Cosine of the flattest angle at which a surface is sampled.
 const LEAST_COS: f32 = 0.35;
 
-/// A view may hide a place that lies this much behind its surface, metres: the surface is not exact yet.
+/// A place counts as visible up to this far behind a view's surface, metres: the surface is not exact yet.
 const THICKNESS_M: f32 = 0.10;
 
-/// Pulls are local: what a wheel's rim tells says nothing of the doors.
+/// Short-range pulls: a match on a wheel's rim must not move the doors.
 const RELAXATION: Relaxation =
     Relaxation { coarsest: 0.24, finest: 0.06, pulls_per_cell: 0.0, scale: 0.02, stiffness: 0.3, fade: 0.2 };
 
-/// What the photographs said.
+/// Result of the photo-consistency search.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PhotoFit {
-    /// Patches that were looked for in other views.
+    /// Patches that were searched for in other views.
     pub patches: usize,
-    /// Those that were found.
+    /// Patches that were found.
     pub found: usize,
-    /// Median distance of the found places to the surface before, metres.
+    /// Median distance of the found places to the surface before it was moved, metres.
     pub before_m: f64,
-    /// And after.
+    /// The distance after it was moved.
     pub after_m: f64,
 }
 
@@ -77,7 +76,7 @@ pub(crate) fn fit_photographs(field: &mut Field, hull: &Field, views: &[View]) -
     Ok(PhotoFit { patches, found: pulls.len(), before_m, after_m: median_distance(field, &pulls) })
 }
 
-/// How many patches were looked for, and where the surface should be by those that were found.
+/// The number of patches searched for, and the pulls to where the surface should be by those that were found.
 fn pulls(views: &[View], geometry: &Geometry) -> (usize, Vec<Pull>) {
     let observers = geometry.observers(views);
     let pictures: Vec<Picture> = views.par_iter().map(Picture::new).collect();
@@ -143,7 +142,7 @@ fn sweep(patch: &Patch, own: usize, observers: &[Observer], pictures: &[Picture]
     if to_camera.dot(patch.normal) < LEAST_COS {
         return None;
     }
-    // Who else sees it: other views as they are, all views as mirrored twins.
+    // Observers of the patch: the other views as they are, all views as mirrored twins.
     let twin = patch.mirrored();
     let others: Vec<(usize, bool)> = (0..observers.len())
         .flat_map(|j| [(j, false), (j, true)])
@@ -187,10 +186,10 @@ fn sweep(patch: &Patch, own: usize, observers: &[Observer], pictures: &[Picture]
     let between = 0.5 * (a - c) / (a - 2.0 * b + c).min(-1e-6);
     let way = (best as f32 + between.clamp(-0.5, 0.5)) * STEP_M - REACH_M;
     let weight = ((scores[best] - AGREEMENT) / (1.0 - AGREEMENT)).clamp(0.1, 1.0);
-    Some(Pull { point: patch.moved(way).center, target: 0.0, wish: Wish::Exactly, weight })
+    Some(Pull { point: patch.moved(way).center, target: 0.0, kind: PullKind::Exact, weight })
 }
 
-/// Brightness of a view, and at half the size.
+/// Brightness of a view at full and at half size.
 struct Picture {
     levels: [(usize, usize, Vec<f32>); 2],
     rotation: glam::Mat3,
@@ -225,8 +224,8 @@ impl Picture {
         }
     }
 
-    /// The patch as this view shows it, of mean 0 and length 1; `None` where it leaves the picture or shows
-    /// nothing. Perspective within the patch is taken as linear.
+    /// The patch as this view shows it, normalised to mean 0 and length 1; `None` if it leaves the picture or lacks
+    /// contrast. Perspective within the patch is approximated as linear.
     fn samples(&self, patch: &Patch, scale: usize) -> Option<[f32; SAMPLES]> {
         let (width, height, level) = &self.levels[scale];
         let p = self.rotation * patch.center + self.translation;

@@ -2,14 +2,14 @@
 
 use rayon::prelude::*;
 
-/// Decay of the mean of gradients and of their squares.
+/// Decay of the means of gradients and of their squares.
 const BETA: [f32; 2] = [0.9, 0.999];
 
-/// Parameters one task works on, at least.
+/// Minimum of parameters per task.
 const CHUNK: usize = 1 << 14;
-/// Parameters in a row, at least: each is worked on by the widest vectors, whose results are the same.
+/// Minimum of parameters in a row, which is processed with the widest vectors; their width does not change the results.
 const ROW: usize = 256;
-/// Its square is far from the end of f32.
+/// Limit to which gradients are clamped; its square is well inside the range of f32.
 const LARGEST: f32 = 1e18;
 
 /// The state of one array.
@@ -19,7 +19,7 @@ pub(super) struct Adam {
     first: Vec<f32>,
     second: Vec<f32>,
     steps: i32,
-    /// Gradients of this size and below are noise, and move a parameter by less than the rate.
+    /// Gradients of this size and below are noise and move a parameter by less than the rate.
     noise: f32,
 }
 
@@ -28,31 +28,31 @@ impl Adam {
         Self { first: vec![0.0; len], second: vec![0.0; len], steps: 0, noise }
     }
 
-    /// Goes on with other parameters, `width` numbers each, made of those in `sources`: the first `survivors` of them
-    /// keep their state, the others begin.
+    /// Continues with other parameters, `width` numbers each, made from those in `sources`: the first `survivors` of
+    /// them keep their state, the others start at zero.
     pub(super) fn follow(&mut self, sources: &[u32], survivors: usize, width: usize) {
         for state in [&mut self.first, &mut self.second] {
-            let of = |&i: &u32| &state[i as usize * width..(i as usize + 1) * width];
+            let own = |&i: &u32| &state[i as usize * width..(i as usize + 1) * width];
             let mut followed: Vec<f32> = Vec::with_capacity(sources.len() * width);
-            sources[..survivors].iter().for_each(|i| followed.extend_from_slice(of(i)));
+            sources[..survivors].iter().for_each(|i| followed.extend_from_slice(own(i)));
             followed.resize(sources.len() * width, 0.0);
             *state = followed;
         }
     }
 
-    /// Forgets all gradients.
+    /// Resets the means of all gradients.
     pub(super) fn forget(&mut self) {
         self.first.fill(0.0);
         self.second.fill(0.0);
     }
 
-    /// One step down the gradient; parameter i moves by not much more than `rates[i % rates.len()]`. A gradient that f32
-    /// can hold but whose square it cannot counts as one that it can.
+    /// Makes one step down the gradient; parameter i moves by about `rates[i % rates.len()]` at most. Gradients whose
+    /// square would overflow f32 are clamped.
     pub(super) fn step(&mut self, parameters: &mut [f32], gradient: &[f32], rates: &[f32]) {
         self.steps += 1;
         let correction = BETA.map(|beta| 1.0 / (1.0 - beta.powi(self.steps)));
         let noise = self.noise;
-        // So many of the pattern that a row has no short loop.
+        // Repeat the pattern until the inner loop over a row is long.
         let row = rates.repeat(ROW.div_ceil(rates.len()));
         let chunk = row.len() * CHUNK.div_ceil(row.len());
         let state = self.first.par_chunks_mut(chunk).zip(self.second.par_chunks_mut(chunk));
@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bowl_is_descended_and_the_largest_gradients_do_no_harm() {
+    fn adam_minimises_a_quadratic_and_survives_the_largest_gradients() {
         let mut x = vec![3.0f32, -2.0];
         let mut adam = Adam::new(2, 1e-15);
         for _ in 0..2000 {
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn survivors_keep_their_state_and_others_begin() {
+    fn survivors_keep_their_state_and_others_start_at_zero() {
         let step = |adam: &mut Adam, x: &mut [f32], g: &[f32]| {
             let before = x.to_vec();
             adam.step(x, g, &[0.1]);
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_is_as_the_paper_has_it() {
+    fn steps_follow_the_papers_equations() {
         let mut x = vec![0.0f32];
         let mut adam = Adam::new(1, 1e-8);
         adam.step(&mut x, &[0.5], &[0.1]);

@@ -1,7 +1,7 @@
 //! One factor per channel for each view: photographs of one drive differ in exposure and white balance.
 //!
-//! Stored colours are about the 1/2.2th power of light, so that a factor on light is one on stored colours. The
-//! factors' geometric mean over the views is 1: else the model itself would have no exposure.
+//! Stored colours are about the 1/2.2th power of light, so that a factor on light is a factor on stored colours. The
+//! factors' geometric mean over the views is 1; otherwise the model's own brightness would be undetermined.
 
 use super::adam::Adam;
 
@@ -22,12 +22,12 @@ impl Exposure {
         Self { adam: Adam::new(3 * views, 1e-8), gradient: logs.clone(), logs }
     }
 
-    /// Factor of a view.
+    /// Factors of a view, RGB.
     pub(super) fn factor(&self, view: usize) -> [f32; 3] {
         self.logs[view].map(f32::exp)
     }
 
-    /// One step, from the gradient of one view's factors.
+    /// Makes one step by the gradient of one view's factors.
     pub(super) fn step(&mut self, view: usize, of_factor: [f32; 3], rate: f32) {
         let factor = self.factor(view);
         self.gradient.fill([0.0; 3]);

@@ -1,10 +1,10 @@
-//! Per-scene optimisation: the Gaussians of one pass are moved until their pictures are the photographs.
+//! Per-scene optimisation: the Gaussians of one pass are optimised until their pictures match the photographs.
 //!
-//! One step draws one view, takes the gradient of its error, and moves every parameter by Adam. Clones have no
-//! parameters of their own (`tie`): what a view of one side says, the other side follows. Photographs differ in
-//! exposure, which is solved for as well (`exposure`). Gaussians may divide and go on the way (`densify`). A view can be
-//! held out to tell when to stop: pictures of the views that take part always get better, the vehicle need not.
-//! [`baseline`] is another method on the same footing.
+//! One step renders one view, computes the gradient of its error, and moves every parameter by Adam. Clones have no
+//! parameters of their own (`tie`): views of one side also move the other side. Photographs differ in
+//! exposure, which is estimated too (`exposure`). Gaussians can be cloned, split and pruned (`densify`). A view can be
+//! held out to decide when to stop: pictures of the optimised views always get better, the vehicle does not.
+//! [`baseline`] is another method on the same code.
 
 mod adam;
 pub mod baseline;
@@ -37,67 +37,67 @@ use vg_scene::View;
 use vg_splat::Gaussians;
 use work::{Measures, Work};
 
-/// Why a refinement ended.
+/// Reason why a refinement ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stop {
     /// All steps are done.
     Done,
-    /// The view that took no part got no better any more.
+    /// The held-out view stopped getting better.
     HeldOut,
-    /// The error grew far beyond where it began: the steps are too large.
+    /// The error grew far beyond its initial value: the steps are too large.
     Diverged,
-    /// No view sees anything of the model: there is nothing to begin with.
+    /// No view sees any part of the model, so there is no gradient.
     Unseen,
 }
 
-/// What a refinement did.
+/// Report of a refinement.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Refinement {
-    /// Steps that were planned: with `Amount::Iterations` of this number another call does the same.
+    /// The number of planned steps: `Amount::Iterations` with this number gives the same result.
     pub iterations: u32,
-    /// Steps that were made.
+    /// The number of steps made.
     pub made: u32,
-    /// Steps that the result has seen; 0 if nothing was better than the beginning.
+    /// The number of steps that led to the result; 0 if no state was better than the initial one.
     pub kept: u32,
-    /// Why it ended.
+    /// Reason for the end.
     pub stop: Stop,
     /// Loss of the first step, and the mean of the last round over the views.
     pub loss: [f64; 2],
-    /// Mean PSNR of the views that took part, each in its exposure, before and after, dB.
+    /// Mean PSNR of the optimised views, each in its exposure, before and after, dB.
     pub psnr_db: [f64; 2],
-    /// The view that did not, where one was held out.
+    /// The view that was held out, if any.
     pub held_out: Option<HeldOut>,
     /// Factors of the views' exposures, RGB, in the order of the views.
     pub exposures: Vec<[f32; 3]>,
-    /// What density control did, where it was wanted.
+    /// Totals of density control, if it was enabled.
     pub densified: Option<Densified>,
-    /// Who drew, and why.
+    /// The renderer that was used, and the reason.
     pub drawn_by: String,
 }
 
-/// The view that took no part.
+/// The view that was held out.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct HeldOut {
-    /// Its name.
+    /// Name of the view.
     pub view: String,
-    /// Its PSNR before and after, dB.
+    /// PSNR of the view before and after, dB.
     pub psnr_db: [f64; 2],
 }
 
-/// Looks at the view that was held out, or at the mean loss, in the course of a refinement.
-const LOOKS: u32 = 20;
-/// So many looks in a row may be worse than the best.
+/// The number of evaluations of the held-out view, or of the mean loss, in the course of a refinement.
+const EVALUATIONS: u32 = 20;
+/// The number of evaluations in a row without improvement after which a refinement stops.
 const PATIENCE: u32 = 4;
-/// A mean loss this many times the first never comes back.
+/// Ratio of the mean loss to the first from which a refinement does not recover.
 const DIVERGED: f64 = 3.0;
-/// Gradients of this size are noise of single pixels: a loss is a mean over all pixels.
+/// Size of gradients that are noise of single pixels: a loss is a mean over all pixels.
 const NOISE: f32 = 1e-9;
-/// Step sizes at the end, as a share of those at the beginning.
+/// Final step sizes as a share of the initial ones.
 const LAST_RATE: f32 = 0.1;
 
-/// Moves the Gaussians until their pictures are those of the views. The last ones are `clones`, mirror images of those
-/// before; they follow. Views are pinholes in the frame whose plane of symmetry is y = 0.
+/// Optimises the Gaussians until their pictures match the views. The last ones are `clones`, mirror images of earlier
+/// ones, which follow their originals. Views are pinholes in the frame whose plane of symmetry is y = 0.
 pub(crate) fn refine(
     mut gaussians: Gaussians,
     clones: &[Tied],
@@ -107,10 +107,10 @@ pub(crate) fn refine(
 ) -> Result<(Gaussians, Refinement)> {
     let start = Instant::now();
     gaussians.truncate(gaussians.len() - clones.len());
-    let beginning = State::of(&gaussians, clones, views.len());
+    let initial = State::new(&gaussians, clones, views.len());
     let measures = Measures { noise: NOISE, extent_m: half_diagonal_m(&gaussians), seed: 0 };
-    let mut work = Work::new(&beginning, views, options, measures)?;
-    let mut state = beginning.clone();
+    let mut work = Work::new(&initial, views, options, measures)?;
+    let mut state = initial.clone();
     drop(gaussians);
     let held_out = (options.hold_out && views.len() >= 3).then_some(views.len() / 2);
     let shown: Vec<usize> = (0..views.len()).filter(|v| Some(*v) != held_out).collect();
@@ -125,7 +125,7 @@ pub(crate) fn refine(
         best.error = -before[v];
     }
     let (mut made, mut stop) = (0, if seen { Stop::Done } else { Stop::Unseen });
-    let mut looks_in_vain = 0;
+    let mut without_gain = 0;
     while plan.goes_on(made) {
         // As in 3DGS, step sizes fall exponentially.
         let rates = options.rates.times(LAST_RATE.powf(plan.part(made)));
@@ -138,7 +138,7 @@ pub(crate) fn refine(
         }
         let Some(planned) = plan.planned() else { continue };
         context.report_loss("refine", f64::from(made) / f64::from(planned), course.last)?;
-        let every = (planned / LOOKS).max(round);
+        let every = (planned / EVALUATIONS).max(round);
         if made % every != 0 && made != planned {
             continue;
         }
@@ -148,24 +148,24 @@ pub(crate) fn refine(
         };
         if error < best.error {
             best = Best { error, step: made, state: state.clone() };
-            looks_in_vain = 0;
+            without_gain = 0;
         } else {
-            looks_in_vain += 1;
+            without_gain += 1;
         }
         if course.has_diverged() {
             stop = Stop::Diverged;
             break;
         }
-        if held_out.is_some() && looks_in_vain >= PATIENCE && made < planned {
+        if held_out.is_some() && without_gain >= PATIENCE && made < planned {
             stop = Stop::HeldOut;
             break;
         }
     }
     let after = work.psnr_db(&best.state, context)?;
-    // What is judged by its own loss alone may have begun better than it ever was later.
+    // Without a held-out view, the initial state may have been better than all later ones.
     let shown_mean = |psnr: &[f64]| shown.iter().map(|&v| psnr[v]).sum::<f64>() / f64::from(round);
     let (best, after) = match held_out.is_none() && shown_mean(&after) < shown_mean(&before) {
-        true => (Best { error: 0.0, step: 0, state: beginning }, before.clone()),
+        true => (Best { error: 0.0, step: 0, state: initial }, before.clone()),
         false => (best, after),
     };
     let report = Refinement {
@@ -183,31 +183,31 @@ pub(crate) fn refine(
     Ok((work.finished(&best.state, context), report))
 }
 
-/// Half the diagonal of the box that holds all centres, metres.
+/// Half the diagonal of the bounding box of all centres, metres.
 fn half_diagonal_m(gaussians: &Gaussians) -> f32 {
     let diagonal =
         |(low, high): ([f32; 3], [f32; 3])| (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f32>().sqrt();
     gaussians.bounds().map_or(1.0, |bounds| 0.5 * diagonal(bounds)).clamp(1e-3, 1e3)
 }
 
-/// Everything that steps change.
+/// The state that steps change.
 #[derive(Clone, Debug)]
 struct State {
-    /// Of the originals.
+    /// Parameters of the originals.
     parameters: Parameters,
-    /// Who follows them.
+    /// Clones that follow the originals.
     clones: Vec<Tied>,
     exposure: Exposure,
 }
 
 impl State {
-    fn of(originals: &Gaussians, clones: &[Tied], views: usize) -> Self {
-        let parameters = Parameters::of(originals);
+    fn new(originals: &Gaussians, clones: &[Tied], views: usize) -> Self {
+        let parameters = Parameters::from_gaussians(originals);
         Self { parameters, clones: clones.to_vec(), exposure: Exposure::new(views) }
     }
 }
 
-/// The state that was best, and after which step.
+/// The best state so far, and the number of steps that led to it.
 struct Best {
     error: f64,
     step: u32,

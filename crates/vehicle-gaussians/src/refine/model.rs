@@ -1,4 +1,4 @@
-//! Refinement of a model that is there already, from wherever it is.
+//! Refinement of an existing model from any source.
 
 use super::{RefineOptions, Refinement, refine};
 use rayon::prelude::*;
@@ -7,15 +7,14 @@ use vg_geometry::{Error, Result};
 use vg_scene::{Scene, View, undistort};
 use vg_splat::Gaussians;
 
-/// Moves the Gaussians of any model, in the scene's frame, until their pictures are the scene's photographs. Nothing is
-/// known of which mirrors which: each goes its own way. [`crate::pipeline::reconstruct`] with `Options::refine` keeps
-/// clones what they are.
+/// Optimises the Gaussians of any model, in the scene's frame, until their pictures match the scene's photographs. All
+/// Gaussians are optimised independently, since mirror pairs are not known. [`crate::pipeline::reconstruct`] with
+/// `Options::refine` keeps clones tied to their originals.
 ///
-/// Standard deviations come back within 1e-7 and 3 m and opacities within 6e-6 of 0 and 1, wherever they were before.
-/// The order is kept.
+/// Standard deviations are clamped to 1e-7 to 3 m, and opacities to 6e-6 from 0 and 1. The order is kept.
 ///
 /// # Errors
-/// A model without Gaussians, options and scenes that are not valid; `Error::Cancelled` where `progress` breaks off.
+/// A model without Gaussians, invalid options or scenes; `Error::Cancelled` if `progress` cancels.
 pub fn model<'a>(
     gaussians: &Gaussians,
     scene: &Scene,
@@ -26,7 +25,7 @@ pub fn model<'a>(
     model_on(&Threads::new(threads)?, gaussians, scene, options, progress)
 }
 
-/// The same on threads that are there already.
+/// [`model()`] on an existing thread pool.
 pub fn model_on<'a>(
     threads: &Threads,
     gaussians: &Gaussians,
@@ -40,7 +39,7 @@ pub fn model_on<'a>(
     }
     options.validate()?;
     scene.validate()?;
-    // Shorter-lived than the callback it borrows.
+    // A closure with a shorter lifetime than the callback that it borrows.
     let mut progress = |at| progress(at);
     let context = Context::new(threads, &mut progress);
     context.follow(Course::new(vec![("refine", 1.0)]));

@@ -1,4 +1,4 @@
-//! What a caller may choose of a refinement.
+//! Options of a refinement.
 
 use super::densify::Densify;
 use super::parameters::Rates;
@@ -7,38 +7,38 @@ use vg_geometry::{Error, Result};
 use vg_splat::render::Backend;
 use vg_splat::render::backend::{is_built, not_built};
 
-/// How long to refine.
+/// Amount of refinement.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Amount {
-    /// So many steps.
+    /// The number of steps.
     Iterations(u32),
-    /// About so many seconds: a number of steps that is found by timing the first ones. The report tells it, and the
-    /// same number gives the same bytes.
+    /// The approximate duration in seconds: the number of steps is found by timing the first ones. The report contains
+    /// it, and the same number gives the same bytes.
     Seconds(f64),
 }
 
-/// Settings of a refinement; `RefineOptions::default()` is what everything is measured with.
+/// Options of a refinement; all measurements use `RefineOptions::default()`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RefineOptions {
-    /// How long.
+    /// Amount of refinement.
     pub amount: Amount,
     /// Step sizes.
     pub rates: Rates,
-    /// Weight of 1 - SSIM beside that of the mean absolute difference of colours, which is the rest to 1.
+    /// Weight of 1 - SSIM; the weight of the mean absolute difference of colours is 1 minus this.
     pub ssim: f32,
     /// Weight of the mean square difference of alpha and mask.
     pub silhouette: f32,
-    /// Weight, per metre, of the mean absolute difference of depth to where the surface was at the beginning: what
-    /// pictures do not tell stays where it was measured.
+    /// Weight, per metre, of the mean absolute difference of depth from the initial surface, which holds the surface
+    /// where the pictures do not determine it.
     pub depth: f32,
-    /// Whether each view has an exposure of its own.
+    /// Whether each view's own exposure is estimated.
     pub exposure: bool,
-    /// Whether one of three or more views takes no part and tells when to stop.
+    /// Whether one of three or more views is held out to decide when to stop.
     pub hold_out: bool,
-    /// Whether Gaussians divide and go on the way; `None`, the default: they do not.
+    /// Density control; `None`, the default, for a fixed set of Gaussians.
     pub densify: Option<Densify>,
-    /// Who draws and goes back; [`trainer`](vg_splat::render::backend::trainer) says what `Auto` is.
+    /// Backend that renders and differentiates; see [`trainer`](vg_splat::render::backend::trainer) for `Auto`.
     pub backend: Backend,
 }
 
@@ -67,12 +67,12 @@ impl Default for RefineOptions {
 }
 
 impl RefineOptions {
-    /// Each field in its range.
+    /// Checks that each field is in its range.
     pub fn validate(&self) -> Result<()> {
         self.validate_as("options.refine")
     }
 
-    /// The same where this is called `argument`.
+    /// [`RefineOptions::validate`] with the name `argument` for these options in errors.
     pub(super) fn validate_as(&self, argument: &str) -> Result<()> {
         let refuse = |field: &str, found: String, allowed: &str| {
             Err(Error::argument(format!("{argument}.{field}"), found, allowed))
@@ -103,5 +103,5 @@ impl RefineOptions {
     }
 }
 
-/// More steps are a mistake: 3DGS takes 30,000.
+/// Maximum of steps; 3DGS uses 30,000.
 const MOST_ITERATIONS: u32 = 1_000_000;

@@ -1,7 +1,6 @@
-//! What is optimised: numbers without bounds, from which the Gaussians are made.
+//! The optimised parameters: unbounded numbers from which the Gaussians are computed.
 //!
-//! Scales are exp(s), opacities sigmoid(o), rotations are normalised, centres and colours are themselves: 3DGS's
-//! own choice.
+//! As in 3DGS, scales are exp(s), opacities sigmoid(o) and rotations normalised; centres and colours are used directly.
 
 use super::adam::Adam;
 use rayon::prelude::*;
@@ -9,45 +8,45 @@ use vg_splat::Gaussians;
 use vg_splat::gaussians::sh;
 use vg_splat::render::Gradients;
 
-/// Bounds of ln(standard deviation in metres): 0.1 micrometres, which no camera tells from less, to 3 m, the
-/// largest that a head makes.
+/// Bounds of ln(standard deviation in metres): 0.1 micrometres, which no camera distinguishes from less, to 3 m, the
+/// largest that a head predicts.
 const LOG_SCALE: [f32; 2] = [-16.1, 1.098_612_3];
 
 /// Bound of |logit(opacity)|: opacities 6e-6 from 0 and 1.
 const MOST_LOGIT: f32 = 12.0;
 
-/// The parameters of n Gaussians.
+/// Parameters of n Gaussians.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Parameters {
     pub(super) sh_degree: u8,
-    /// Metres. `[n][3]`
+    /// Centres, metres. `[n][3]`
     pub(super) means: Vec<[f32; 3]>,
-    /// Of any length but 0. `[n][4]`
+    /// Quaternions of any length but 0. `[n][4]`
     pub(super) rotations: Vec<[f32; 4]>,
-    /// `[n][3]`
+    /// Logarithms of standard deviations in metres. `[n][3]`
     pub(super) log_scales: Vec<[f32; 3]>,
-    /// `[n]`
+    /// Logits of opacities. `[n]`
     pub(super) logits: Vec<f32>,
-    /// `[n][(degree + 1)^2][3]`
+    /// SH coefficients of colours. `[n][(degree + 1)^2][3]`
     pub(super) sh: Vec<f32>,
 }
 
-/// Steps per iteration of each kind of parameter.
+/// Step sizes of each kind of parameter.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Rates {
-    /// Of centres, as a share of the scene's radius.
+    /// Step size of centres, as a share of the scene's radius.
     pub means: f32,
-    /// Of quaternions.
+    /// Step size of quaternions.
     pub rotations: f32,
-    /// Of ln(scale).
+    /// Step size of ln(scale).
     pub scales: f32,
-    /// Of logit(opacity).
+    /// Step size of logit(opacity).
     pub opacities: f32,
-    /// Of the colour's mean over directions, in SH coefficients.
+    /// Step size of the colour's mean over directions, in SH coefficients.
     pub colors: f32,
-    /// Of SH bands 1 and above.
+    /// Step size of SH bands 1 and above.
     pub view_dependence: f32,
-    /// Of the logarithm of a view's exposure.
+    /// Step size of the logarithm of a view's exposure.
     pub exposure: f32,
 }
 
@@ -65,7 +64,7 @@ impl Rates {
         ]
     }
 
-    /// All of them times `factor`.
+    /// All step sizes times `factor`.
     pub(super) fn times(&self, factor: f32) -> Self {
         let Self { means, rotations, scales, opacities, colors, view_dependence, exposure } = *self;
         Self {
@@ -81,7 +80,7 @@ impl Rates {
 }
 
 impl Parameters {
-    pub(super) fn of(gaussians: &Gaussians) -> Self {
+    pub(super) fn from_gaussians(gaussians: &Gaussians) -> Self {
         let logit = |o: f32| (o / (1.0 - o)).ln().clamp(-MOST_LOGIT, MOST_LOGIT);
         Self {
             sh_degree: gaussians.sh_degree(),
@@ -97,19 +96,19 @@ impl Parameters {
         }
     }
 
-    /// Copies of those in `sources`, in this order.
+    /// Copies of the parameters of `sources`, in this order.
     pub(super) fn gathered(&self, sources: &[u32]) -> Self {
-        fn of<T: Copy>(all: &[T], sources: &[u32]) -> Vec<T> {
+        fn gather<T: Copy>(all: &[T], sources: &[u32]) -> Vec<T> {
             sources.iter().map(|&i| all[i as usize]).collect()
         }
         let stride = self.stride();
         let color = |&i: &u32| &self.sh[i as usize * stride..(i as usize + 1) * stride];
         Self {
             sh_degree: self.sh_degree,
-            means: of(&self.means, sources),
-            rotations: of(&self.rotations, sources),
-            log_scales: of(&self.log_scales, sources),
-            logits: of(&self.logits, sources),
+            means: gather(&self.means, sources),
+            rotations: gather(&self.rotations, sources),
+            log_scales: gather(&self.log_scales, sources),
+            logits: gather(&self.logits, sources),
             sh: sources.iter().flat_map(color).copied().collect(),
         }
     }
@@ -118,7 +117,7 @@ impl Parameters {
         self.logits.len()
     }
 
-    /// Numbers of one colour.
+    /// The number of coefficients of one colour.
     pub(super) fn stride(&self) -> usize {
         3 * sh::coefficients(self.sh_degree)
     }
@@ -127,7 +126,7 @@ impl Parameters {
         self.log_scales[i].map(f32::exp)
     }
 
-    /// Back inside the bounds, where a step has left them.
+    /// Clamps the parameters to their bounds after a step.
     pub(super) fn bound(&mut self) {
         let Self { log_scales, logits, rotations, .. } = self;
         let rotations = rotations.par_iter_mut().zip(log_scales).zip(logits);
@@ -151,7 +150,7 @@ pub(super) struct Optimizer {
     scales: Adam,
     opacities: Adam,
     sh: Adam,
-    /// The gradient of the parameters, from that of the Gaussians.
+    /// Buffer for the gradient of one kind of parameter.
     gradient: Vec<f32>,
 }
 
@@ -167,7 +166,7 @@ impl Optimizer {
         }
     }
 
-    /// Goes on with parameters made of those in `sources`, of which the first `survivors` keep their state.
+    /// Continues with parameters made from those in `sources`, of which the first `survivors` keep their state.
     pub(super) fn follow(&mut self, sources: &[u32], survivors: usize, sh_degree: u8) {
         let Self { means, rotations, scales, opacities, sh, .. } = self;
         let stride = 3 * sh::coefficients(sh_degree);
@@ -176,12 +175,12 @@ impl Optimizer {
         }
     }
 
-    /// Opacities were set to something else.
+    /// Resets the optimizer's state of the opacities.
     pub(super) fn forget_opacities(&mut self) {
         self.opacities.forget();
     }
 
-    /// One step down `gradients`, which are of the Gaussians made of these parameters; `radius_m` is the scene's.
+    /// Makes one step down `gradients`, those of the Gaussians with these parameters; `radius_m` is the scene's radius.
     pub(super) fn step(
         &mut self,
         parameters: &mut Parameters,

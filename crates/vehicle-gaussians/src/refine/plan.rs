@@ -1,9 +1,9 @@
-//! How many steps a run has: so many, or as many as fit into a time, which its first steps tell.
+//! The number of steps of a run: given, or as many as fit into a duration, found by timing the first steps.
 
 use super::options::Amount;
 use std::time::{Duration, Instant};
 
-/// Rounds over the views that tell how long a step takes. What depends on the number of steps waits for them.
+/// Rounds over the views that are timed. Schedules that depend on the number of steps start after them.
 const TIMED_ROUNDS: u32 = 2;
 
 /// The steps of one run.
@@ -17,7 +17,7 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    /// Of a run that began at `start` and is about to make its first step; `round` steps see every view once.
+    /// The plan of a run that began at `start` and is about to make its first step; `round` steps see every view once.
     pub(super) fn new(amount: Amount, round: u32, start: Instant) -> Self {
         let planned = match amount {
             Amount::Iterations(n) => Some(n),
@@ -31,7 +31,7 @@ impl Plan {
         self.planned.is_none_or(|n| made < n)
     }
 
-    /// Looks at the clock once the timed steps are made.
+    /// Reads the clock once the timed steps are made.
     pub(super) fn note(&mut self, made: u32) {
         if let (None, Amount::Seconds(seconds)) = (self.planned, self.amount)
             && made == self.timed
@@ -41,18 +41,18 @@ impl Plan {
         }
     }
 
-    /// How many steps, once that is known.
+    /// The number of steps, once it is known.
     pub(super) fn planned(&self) -> Option<u32> {
         self.planned
     }
 
-    /// The same for what may depend on it after `made` steps: whether it was known from the beginning or not, the same
-    /// number of steps then gives the same bytes.
+    /// The number of steps, for schedules after `made` steps; `None` while steps are timed, even if the number was
+    /// given, so that the same number of steps always gives the same bytes.
     pub(super) fn planned_at(&self, made: u32) -> Option<u32> {
         self.planned.filter(|_| made > self.timed)
     }
 
-    /// How far the steps are, 0 to 1: not away from 0 while they are timed.
+    /// Progress of the steps, 0 to 1; 0 while they are timed.
     pub(super) fn part(&self, made: u32) -> f32 {
         self.planned_at(made).map_or(0.0, |planned| {
             (made - self.timed) as f32 / planned.saturating_sub(self.timed).max(1) as f32
@@ -60,8 +60,8 @@ impl Plan {
     }
 }
 
-/// Steps of `step` seconds that fit into `seconds`, of which setting up took `setup`, and a last look takes about as
-/// much.
+/// The number of steps of `step` seconds that fit into `seconds`, minus `setup` seconds for the setup and about as much
+/// for the final evaluation.
 fn fitting(seconds: f64, setup: f64, step: f64) -> u32 {
     ((seconds - 2.0 * setup) / step) as u32
 }

@@ -1,7 +1,7 @@
-//! What a view's picture should be, and how far one is from it.
+//! The target of a view's picture, and the loss of a picture relative to it.
 //!
-//! Pictures are drawn on nothing, so that exposure acts on the vehicle alone, and compared with the photograph on white,
-//! as everywhere (`metrics::on_white`). Pixels of which nothing is known count for nothing.
+//! Pictures are rendered on a transparent background, so that exposure acts on the vehicle alone, and compared with the
+//! photograph on white, as everywhere (`metrics::on_white`). Unknown pixels have weight zero.
 
 use super::RefineOptions;
 use crate::metrics;
@@ -11,38 +11,38 @@ use vg_scene::mask::Label;
 use vg_splat::render::loss::{self, Structure, Term};
 use vg_splat::render::{PictureGradient, Rendered};
 
-/// A view's photograph, ready to be compared with.
+/// A view's photograph, prepared for the loss.
 #[derive(Debug)]
 pub(super) struct Target {
-    /// On white. `[height * width]`
+    /// Colour on white. `[height * width]`
     color: Vec<[f32; 3]>,
-    /// 1 where vehicle. `[height * width]`
+    /// 1 for vehicle pixels, else 0. `[height * width]`
     alpha: Vec<f32>,
-    /// 0 where unknown, else 1. `[height * width]`
+    /// 0 for unknown pixels, else 1. `[height * width]`
     known: Vec<f32>,
-    /// Metres, as drawn at the beginning; 0 where nothing holds it. `[height * width]`
+    /// Initial rendered depth, metres; 0 where depth is not held. `[height * width]`
     depth: Vec<f32>,
-    /// Without a mask nothing is known but where something is drawn at the beginning.
+    /// Whether the view has a mask; without one, pixels are known where the initial picture is opaque.
     has_mask: bool,
-    /// For SSIM; `None` before [`Target::hold`], and of pictures smaller than its window, which have no SSIM.
+    /// Precomputed SSIM terms; `None` before [`Target::hold`], and for pictures smaller than the SSIM window.
     structure: Option<Structure>,
 }
 
-/// How far a picture is from a target.
+/// The loss of a picture.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Loss {
-    /// The weighted sum of all terms.
+    /// Weighted sum of all terms.
     pub(super) total: f64,
     /// Gradient of the exposure's factors.
     pub(super) of_exposure: [f32; 3],
 }
 
 impl Target {
-    pub(super) fn of(view: &View) -> Self {
+    pub(super) fn new(view: &View) -> Self {
         let pixels = view.camera.width as usize * view.camera.height as usize;
         let labels = (0..pixels).map(|i| view.mask.as_ref().map_or(Label::Vehicle, |m| m.labels()[i]));
         let flags =
-            |label: Label, of: &[Label]| of.iter().map(|l| f32::from(u8::from(*l == label))).collect();
+            |label: Label, all: &[Label]| all.iter().map(|l| f32::from(u8::from(*l == label))).collect();
         let labels: Vec<Label> = labels.collect();
         let unknown: Vec<f32> = flags(Label::Unknown, &labels);
         Self {
@@ -55,7 +55,7 @@ impl Target {
         }
     }
 
-    /// Holds the surface where this picture has it, inside the mask.
+    /// Holds the surface at this picture's depth, inside the mask.
     pub(super) fn hold(&mut self, picture: &Rendered) -> Result<()> {
         if !self.has_mask {
             self.known = picture.alpha.iter().map(|drawn| f32::from(u8::from(*drawn > 0.5))).collect();
@@ -73,7 +73,7 @@ impl Target {
         Ok(())
     }
 
-    /// The loss of a picture drawn on nothing and shown with `factor`; adds to its gradient.
+    /// The loss of a picture on a transparent background under the exposure `factor`; adds to the picture's gradient.
     pub(super) fn loss(
         &self,
         picture: &Rendered,
@@ -114,7 +114,7 @@ impl Target {
         Ok(Loss { total, of_exposure: of_exposure.map(|g| g as f32) })
     }
 
-    /// PSNR of a picture shown with `factor`, over the pixels of which something is known, dB.
+    /// PSNR of a picture under the exposure `factor`, over the known pixels, dB.
     pub(super) fn psnr_db(&self, picture: &Rendered, factor: [f32; 3], shown: &mut Shown) -> f64 {
         shown.show(picture, factor);
         let mut sum = 0.0;
@@ -127,7 +127,7 @@ impl Target {
     }
 }
 
-/// A picture as it is compared: in its exposure, on white. Memory is reused.
+/// A picture as it is compared: under its exposure, on white. Its memory is reused.
 #[derive(Debug, Default)]
 pub(super) struct Shown {
     picture: Rendered,

@@ -1,5 +1,5 @@
-//! Symmetry built in: a clone has no parameters of its own, it is the mirror image of its original in the light of
-//! its own side. What a view says of either moves the original.
+//! Built-in symmetry: a clone has no parameters of its own; it is the mirror image of its original in the light of
+//! its own side. Gradients of both move the original.
 
 use super::parameters::{Parameters, sigmoid};
 use rayon::prelude::*;
@@ -10,16 +10,16 @@ use vg_splat::render::Gradients;
 /// A Gaussian that is the mirror image of another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Clone {
-    /// Index of its original.
+    /// Index of the original.
     pub(crate) of: u32,
     /// Factor on the stored colour, per channel (`relight`).
     pub(crate) gain: [f32; 3],
 }
 
-/// Gaussians one task works on.
+/// Gaussians per task.
 const CHUNK: usize = 1 << 12;
 
-/// The Gaussians of these parameters: the originals in order, then the clones.
+/// Computes the Gaussians of these parameters: the originals in order, then the clones.
 pub(super) fn made(parameters: &Parameters, clones: &[Clone], out: &mut Gaussians) {
     let n = parameters.len();
     let stride = parameters.stride();
@@ -55,15 +55,15 @@ pub(super) fn made(parameters: &Parameters, clones: &[Clone], out: &mut Gaussian
         for (k, c) in color.iter_mut().enumerate() {
             *c = clone.gain[k % 3] * signs[k] * original[k];
         }
-        // Colour is 0.5 + Y0 c: a factor on it moves the half as well.
+        // Colour is 0.5 + Y0 c: a factor on it scales the 0.5 as well.
         for (c, gain) in color.iter_mut().zip(clone.gain) {
             *c += (gain - 1.0) * 0.5 / sh::Y0;
         }
     });
 }
 
-/// Adds what the clones feel to their originals, whose gradients come first; the adjoint of [`made`]. One clone at
-/// most has each original, so that no order matters.
+/// Adds the clones' gradients to those of their originals, which come first; the adjoint of [`made`]. Each original has
+/// at most one clone, so the order does not matter.
 pub(super) fn gather(gradients: &mut Gradients, clones: &[Clone], n: usize, sh_degree: u8) {
     let stride = 3 * sh::coefficients(sh_degree);
     let signs = vg_splat::gaussians::mirror::sh_signs(sh_degree);
@@ -95,7 +95,7 @@ pub(super) fn gather(gradients: &mut Gradients, clones: &[Clone], n: usize, sh_d
     gradients.sh.truncate(n * stride);
 }
 
-/// The ties of Gaussians made of those in `sources`: who is made of one with a clone has one.
+/// The clones after a growth: each new Gaussian has one if its source in `sources` had one.
 pub(super) fn followed(clones: &[Clone], sources: &[u32], originals: usize) -> Vec<Clone> {
     let mut gains: Vec<Option<[f32; 3]>> = vec![None; originals];
     clones.iter().for_each(|clone| gains[clone.of as usize] = Some(clone.gain));
@@ -107,7 +107,7 @@ pub(super) fn followed(clones: &[Clone], sources: &[u32], originals: usize) -> V
 mod tests {
     use super::*;
 
-    /// Numbers in (-1, 1) that look random.
+    /// Pseudo-random numbers in (-1, 1).
     fn numbers(n: usize, seed: u32) -> Vec<f32> {
         (0..n).map(|i| ((i as f32 + 1.0) * 12.9898 + seed as f32 * 78.233).sin()).collect()
     }
@@ -138,7 +138,7 @@ mod tests {
     ];
 
     #[test]
-    fn clones_are_the_mirror_images_that_the_symmetry_makes() {
+    fn clones_equal_mirrored_originals() {
         let parameters = some(5, 2);
         let mut all = Gaussians::default();
         made(&parameters, &CLONES, &mut all);
@@ -152,10 +152,10 @@ mod tests {
             assert_eq!(all.scales()[at], mirrored.scales()[of]);
             assert_eq!(all.opacities()[at], mirrored.opacities()[of]);
         }
-        // The first has the light of its original.
+        // The gain of the first is 1.
         let stride = all.sh_stride();
         assert_eq!(all.sh()[5 * stride..6 * stride], mirrored.sh()[4 * stride..5 * stride]);
-        // The second is shown 0.5, 1.25 and 2 times as bright from everywhere.
+        // The second is 0.5, 1.25 and 2 times as bright from every direction.
         let from = [0.6, -0.64, 0.48];
         let color = |g: &Gaussians, i: usize| sh::color(&g.sh()[i * stride..(i + 1) * stride], from, 2);
         for (c, gain) in [0.5, 1.25, 2.0].into_iter().enumerate() {
@@ -200,7 +200,7 @@ mod tests {
                 + sum(g.opacities(), &of.opacities)
                 + sum(g.sh(), &of.sh)
         };
-        // Making is affine in what the gradients are of: two states differ by J (x - y).
+        // `made` is affine in the Gaussians' values: two states differ by J (x - y).
         let mut other = some(n, degree);
         other.means = threes(n, 21);
         other.rotations = fours(n, 22);

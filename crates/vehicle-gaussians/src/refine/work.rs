@@ -1,4 +1,4 @@
-//! One step, and a look at where it led.
+//! Steps of a refinement, and the evaluation of its state.
 
 use super::densify::{self, Densified, Growth, Schedule, Seen};
 use super::parameters::{Optimizer, Parameters, Rates};
@@ -11,18 +11,18 @@ use vg_splat::Gaussians;
 use vg_splat::render::backend::{Choice, Trainer, trainer};
 use vg_splat::render::{Background, Gradients, PictureGradient, RenderOptions, Rendered};
 
-/// What is not the same for every way to optimise.
+/// Constants that differ between the methods of optimisation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Measures {
     /// Gradients of this size and below move a parameter by less than the rate.
     pub(super) noise: f32,
-    /// Steps of centres are shares of it, and so are the sizes that density control goes by, metres.
+    /// Unit of the step size of centres and of the sizes in density control, metres.
     pub(super) extent_m: f32,
-    /// What draws of density control depend on.
+    /// Seed of density control.
     pub(super) seed: u64,
 }
 
-/// What one vehicle's refinement works with.
+/// Inputs and buffers of one vehicle's refinement.
 pub(super) struct Work<'a> {
     views: &'a [View],
     targets: Vec<Target>,
@@ -32,7 +32,7 @@ pub(super) struct Work<'a> {
     renderer: Trainer,
     choice: Choice,
     render: RenderOptions,
-    /// What density control did.
+    /// Totals of density control.
     densified: Densified,
     // Reused from step to step.
     gaussians: Gaussians,
@@ -41,12 +41,12 @@ pub(super) struct Work<'a> {
     of_picture: PictureGradient,
     gradients: Gradients,
     seen: Seen,
-    /// Whether density control still wants to know.
-    watches: bool,
+    /// Whether density control still collects gradients.
+    collects: bool,
 }
 
 impl<'a> Work<'a> {
-    /// For steps from `state` on.
+    /// Prepares steps from `state` on.
     pub(super) fn new(
         state: &State,
         views: &'a [View],
@@ -59,13 +59,13 @@ impl<'a> Work<'a> {
         let (renderer, choice) = trainer(options.backend)?;
         Ok(Self {
             views,
-            targets: views.iter().map(Target::of).collect(),
+            targets: views.iter().map(Target::new).collect(),
             options,
             measures,
             optimizer: Optimizer::new(state.parameters.len(), sh_degree, measures.noise),
             renderer,
             choice,
-            // Drawn on nothing, so that exposure acts on the vehicle alone.
+            // Transparent, so that exposure acts on the vehicle alone.
             render: RenderOptions { background: Background::Transparent, ..RenderOptions::default() },
             densified: Densified::default(),
             gaussians: Gaussians::default(),
@@ -74,21 +74,21 @@ impl<'a> Work<'a> {
             of_picture: PictureGradient::default(),
             gradients: Gradients::default(),
             seen,
-            watches: options.densify.is_some(),
+            collects: options.densify.is_some(),
         })
     }
 
-    /// Who draws, and why.
+    /// The renderer that is used, and the reason.
     pub(super) fn drawn_by(&self) -> String {
         self.choice.to_string()
     }
 
-    /// From now on colours have this SH degree; those above do nothing and stay as they are.
+    /// Renders colours up to this SH degree from now on; coefficients above it do not change.
     pub(super) fn show_degree(&mut self, sh_degree: u8) {
         self.render.sh_degree = sh_degree;
     }
 
-    /// One step by what `view` shows; the loss before it.
+    /// Makes one step by the gradient of `view`; returns the loss before it.
     pub(super) fn step(
         &mut self,
         view: usize,
@@ -96,7 +96,8 @@ impl<'a> Work<'a> {
         rates: &Rates,
         context: &Context,
     ) -> Result<f64> {
-        let Self { views, targets, options, measures, optimizer, renderer, render, seen, watches, .. } = self;
+        let Self { views, targets, options, measures, optimizer, renderer, render, seen, collects, .. } =
+            self;
         let (gaussians, gradients) = (&mut self.gaussians, &mut self.gradients);
         let (picture, shown, of_picture) = (&mut self.picture, &mut self.shown, &mut self.of_picture);
         let State { parameters, clones, exposure } = state;
@@ -110,7 +111,7 @@ impl<'a> Work<'a> {
             let camera = &views[view].camera;
             let results = (picture, of_picture, &mut *gradients);
             renderer.forward_backward(gaussians, camera, render, results, &mut of_loss)?;
-            if *watches {
+            if *collects {
                 seen.note(gaussians, gradients, camera, clones);
             }
             tie::gather(gradients, clones, parameters.len(), parameters.sh_degree);
@@ -122,17 +123,17 @@ impl<'a> Work<'a> {
         })
     }
 
-    /// Density control after `made` of `planned` steps, where it is wanted and due.
+    /// Runs density control after `made` of `planned` steps, if it is enabled and due.
     pub(super) fn densify(&mut self, state: &mut State, made: u32, planned: u32, context: &Context) {
         let Some(rules) = &self.options.densify else { return };
-        let schedule = Schedule::of(planned);
-        self.watches = schedule.looks_at(made);
+        let schedule = Schedule::new(planned);
+        self.collects = schedule.collects_at(made);
         let State { parameters, clones, .. } = state;
         if schedule.grows_at(made) {
             let growth = context.parallel(|| {
                 let prunes_large = rules.resets && schedule.prunes_large_at(made);
                 let extent_m = self.measures.extent_m;
-                Growth::of(parameters, clones, &self.seen, rules, extent_m, prunes_large)
+                Growth::new(parameters, clones, &self.seen, rules, extent_m, prunes_large)
             });
             if let Some(growth) = growth {
                 *clones = tie::followed(clones, &growth.sources, parameters.len());
@@ -149,12 +150,12 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// What density control did, where it was wanted.
+    /// Totals of density control, if it is enabled.
     pub(super) fn densified(&self) -> Option<Densified> {
         self.options.densify.map(|_| self.densified)
     }
 
-    /// Holds the surface where `state` has it; what [`Work::psnr_db`] of it says, and whether any view sees it.
+    /// Holds the surface of `state`; returns [`Work::psnr_db`] and whether any view sees the model.
     pub(super) fn begin(&mut self, state: &State, context: &Context) -> Result<(Vec<f64>, bool)> {
         context.parallel(|| {
             tie::made(&state.parameters, &state.clones, &mut self.gaussians);
@@ -178,7 +179,7 @@ impl<'a> Work<'a> {
         })
     }
 
-    /// The same of all views.
+    /// PSNR of all views on white, each in its exposure, dB.
     pub(super) fn psnr_db(&mut self, state: &State, context: &Context) -> Result<Vec<f64>> {
         context.parallel(|| {
             tie::made(&state.parameters, &state.clones, &mut self.gaussians);

@@ -113,25 +113,41 @@ fn each_break_is_named() {
             }),
             "output cam_to_ref_pred: missing; a prior with vg.metric=false needs it",
         ),
-        ("NaN", Box::new(|g| says(g, "depth", f32::NAN)), "output depth: NaN came of a run; allowed: finite"),
+        (
+            "NaN",
+            Box::new(|g| says(g, "depth", f32::NAN)),
+            "output depth: the network returned NaN; allowed: finite",
+        ),
         (
             "infinite",
             Box::new(|g| says(g, "confidence", f32::INFINITY)),
-            "output confidence: inf came of a run",
+            "output confidence: the network returned inf",
         ),
         (
             "negative",
             Box::new(|g| says(g, "depth", -2.0)),
-            "output depth: -2 came of a run; allowed: above 0",
+            "output depth: the network returned -2; allowed: above 0",
         ),
-        ("short rays", Box::new(|g| says(g, "rays", 0.5)), "output rays: a ray of length 0.866"),
-        ("mask of 2", Box::new(|g| says(g, "mask", 2.0)), "output mask: 2 came of a run; allowed: 0 to 1"),
-        ("scale 0", Box::new(|g| says(g, "scale", 0.0)), "output scale: 0 came of a run; allowed: above 0"),
+        (
+            "short rays",
+            Box::new(|g| says(g, "rays", 0.5)),
+            "output rays: the network returned a ray of length 0.866",
+        ),
+        (
+            "mask of 2",
+            Box::new(|g| says(g, "mask", 2.0)),
+            "output mask: the network returned 2; allowed: 0 to 1",
+        ),
+        (
+            "scale 0",
+            Box::new(|g| says(g, "scale", 0.0)),
+            "output scale: the network returned 0; allowed: above 0",
+        ),
         ("no rotation", Box::new(|g| says(g, "cam_to_ref_pred", 1.0)), "output cam_to_ref_pred[0]: "),
         (
             "five views",
             Box::new(|g| g.inputs.iter_mut().for_each(|p| p.dimensions[0] = Some(5))),
-            "views: 4; allowed: 5: the network of ",
+            "views: 4; allowed: 5, the fixed number of views of the network ",
         ),
     ];
     assert!(breaks.len() >= 20);

@@ -206,7 +206,8 @@ fn poses_of_other_pictures_are_told_and_rays_of_another_lens_refused() {
     let model = open("lens", &fixed).unwrap();
     let text = estimate(&scene, &model).unwrap_err().to_string();
     assert!(
-        text.starts_with("prior: the network's rays lean by ") && text.contains("another lens"),
+        text.starts_with("prior: the network's rays differ from those of the intrinsics by ")
+            && text.contains("another lens"),
         "{text}"
     );
 }
@@ -218,7 +219,7 @@ fn a_network_without_metres_needs_two_places() {
     let graph = ellipsoid(&one.views[0].camera, WIDTH.into(), HEIGHT.into(), manner);
     let Some(model) = open("one", &graph) else { return };
     let text = estimate(&one, &model).unwrap_err().to_string();
-    assert!(text.contains("nothing tells the vehicle's size"), "{text}");
+    assert!(text.contains("the vehicle's size cannot be determined"), "{text}");
     let graph = ellipsoid(&one.views[0].camera, WIDTH.into(), HEIGHT.into(), Manner::PLAIN);
     let told = estimate(&one, &open("metric one", &graph).unwrap()).unwrap().network.unwrap();
     assert!(told.warnings.iter().any(|w| w.contains("the network's own scale")), "{:?}", told.warnings);

@@ -54,15 +54,15 @@ fn heads_that_break_the_contract_are_named() {
     let breaks: [Break; 6] = [
         (|g| g.metadata.retain(|(k, _)| k != "vg.head"), "metadata vg.head: missing"),
         (|g| g.set("vg.scale_activation", "exp"), "metadata vg.scale_activation: \"exp\"; allowed: softplus"),
-        (|g| g.set("vg.prior", "x"), "metadata vg.prior: \"x\": a geometry prior, no Gaussian head"),
+        (|g| g.set("vg.prior", "x"), "metadata vg.prior: \"x\": a geometry prior, not a Gaussian head"),
         (|g| g.outputs[0].dimensions[1] = None, "accepted"),
-        (|g| g.inputs[0].dimensions[2] = Some(36), "input images: of a fixed size"),
+        (|g| g.inputs[0].dimensions[2] = Some(36), "input images: a fixed size"),
         (
             |g| {
                 g.rename_output_of("attributes", "before");
                 g.floats("bad", &[1], &[f32::NAN]).node("Add", &["before", "bad"], "attributes", &[]);
             },
-            "output attributes: NaN came of a run",
+            "output attributes: the network returned NaN",
         ),
     ];
     for (k, (break_it, expected)) in breaks.into_iter().enumerate() {

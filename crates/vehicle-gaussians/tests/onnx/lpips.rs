@@ -144,7 +144,7 @@ fn picture_distances_that_break_the_contract_are_named() {
                 g.rename_output_of("lpips", "before");
                 g.floats("bad", &[1], &[f32::NAN]).node("Add", &["before", "bad"], "lpips", &[]);
             },
-            "output lpips: NaN came of a run; allowed: finite",
+            "output lpips: the network returned NaN; allowed: finite",
         ),
     ];
     let [a, b] = pictures(64, 64);

@@ -63,24 +63,27 @@ fn segmentations_that_break_the_contract_are_named() {
     let breaks: [Break; 10] = [
         (|g| g.metadata.retain(|(k, _)| k != "vg.contract"), "metadata vg.contract: missing"),
         (|g| g.metadata.retain(|(k, _)| k != "vg.mask"), "metadata vg.mask: missing"),
-        (|g| g.set("vg.prior", "x"), "metadata vg.prior: \"x\": a geometry prior, no segmentation"),
-        (|g| g.set("vg.head", "x"), "metadata vg.head: \"x\": a Gaussian head, no segmentation"),
+        (
+            |g| g.set("vg.prior", "x"),
+            "metadata vg.prior: \"x\": a geometry prior, not a segmentation network",
+        ),
+        (|g| g.set("vg.head", "x"), "metadata vg.head: \"x\": a Gaussian head, not a segmentation network"),
         (|g| g.inputs.push(Port::new("prompt", &[Some(1)])), "input prompt: unknown; allowed: images"),
-        (|g| g.inputs[0].dimensions[0] = Some(2), "input images: takes 2 views at once; allowed: 1 or any"),
+        (|g| g.inputs[0].dimensions[0] = Some(2), "input images: 2 views per run; allowed: 1 or any"),
         (|g| g.outputs[0].dimensions = vec![None, Some(1), Some(72), Some(96)], "allowed: [any, 72, 96]"),
         (
             |g| {
                 g.rename_output_of("mask", "before");
                 g.floats("two", &[1], &[2.0]).node("Add", &["before", "two"], "mask", &[]);
             },
-            "output mask: 2",
+            "output mask: the network returned 2",
         ),
         (
             |g| {
                 g.rename_output_of("mask", "before");
                 g.floats("bad", &[1], &[f32::NAN]).node("Add", &["before", "bad"], "mask", &[]);
             },
-            "output mask: NaN came of a run; allowed: finite",
+            "output mask: the network returned NaN; allowed: finite",
         ),
         (|g| g.set("vg.std", "0,1,1"), "metadata vg.std: [0.0, 1.0, 1.0]; allowed: no zeros"),
     ];

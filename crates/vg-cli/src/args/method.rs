@@ -203,7 +203,7 @@ impl MethodArgs {
             refine: self.refine.filter(|_| self.baseline.is_none()).map(|amount| RefineOptions {
                 amount,
                 hold_out: self.refine_hold_out,
-                densify: self.refine_densify.then(Densify::of_refinement),
+                densify: self.refine_densify.then(Densify::for_refinement),
                 backend: self.refine_backend,
                 ..RefineOptions::default()
             }),

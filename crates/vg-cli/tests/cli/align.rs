@@ -64,7 +64,7 @@ fn a_scan_gives_the_sample_s_frame_and_says_how_well_it_fits() {
     // A view without a mask is left out and reported.
     fs::remove_file(at.join("masks/007.png")).unwrap();
     let run = succeed_with_warnings(at, "align {} --scan {}/scan.ply -o {}/v.json");
-    assert!(run.err.contains("007.png: no mask: looked for masks/"), "{run:?}");
+    assert!(run.err.contains("007.png: no mask; searched for masks/"), "{run:?}");
     let out = run.out;
     assert!(out.contains("7 masks; 1 view without a mask was left out"), "{out}");
 }

@@ -1,4 +1,4 @@
-//! Files that belong to a picture by their names: the picture itself, its mask, its depth map.
+//! Files found by a picture's name: the picture itself, its mask, its depth map.
 //!
 //! ```text
 //! images/000.jpg    or .JPG; without an extension in the scene file: .png, .jpg or .jpeg
@@ -6,44 +6,44 @@
 //! depth/000.png     or depths/; 000.png, 000.jpg.png, 000_depth.png, 000.depth.png; PNG, NumPy, PFM or EXR
 //! ```
 //!
-//! An exact name comes before one that differs in the case of its letters.
+//! An exact name takes precedence over one that differs in upper and lower case.
 
 use super::files::is_there;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// Extensions of pictures, the ones that are tried where a scene file leaves them out.
+/// Extensions of pictures, which are tried if a scene file omits them.
 pub(super) const PICTURES: [&str; 3] = ["png", "jpg", "jpeg"];
 const MASK_FOLDERS: [&str; 2] = ["masks", "mask"];
 const MASKS: [&str; 4] = ["png", "jpg", "jpeg", "npy"];
 const DEPTH_FOLDERS: [&str; 2] = ["depth", "depths"];
 const DEPTHS: [&str; 4] = ["png", "npy", "pfm", "exr"];
 
-/// Looks files up in the folder of a scene. A folder is listed once, and only where an exact name was not there.
+/// Looks files up in the folder of a scene. A folder is listed once, and only if an exact name does not exist.
 pub(super) struct Finder {
     root: PathBuf,
-    /// By folder: the names in it by their lower-case spelling, and the first of each in order.
+    /// For each folder, the first path in order by lower-case name.
     listed: HashMap<PathBuf, HashMap<String, PathBuf>>,
 }
 
-/// A picture's name in pieces, `sub/000` and `sub/000.jpg`.
+/// A picture's name without and with its extension: `sub/000` and `sub/000.jpg`.
 struct Name {
     stem: PathBuf,
     full: PathBuf,
 }
 
 impl Finder {
-    /// For the scene in `root`.
+    /// A finder for the scene in `root`.
     pub(super) fn new(root: &Path) -> Self {
         Self { root: root.to_owned(), listed: HashMap::new() }
     }
 
-    /// The picture that a scene file calls `path`; `path` itself where there is none.
+    /// The picture that a scene file names `path`; `path` itself if it does not exist.
     pub(super) fn picture(&mut self, path: PathBuf) -> PathBuf {
         if let Some(found) = self.find(&path) {
             return found;
         }
-        // NeRF's synthetic scenes leave the extension out.
+        // NeRF's synthetic scenes omit the extension.
         let longer = match has_picture_extension(&path) {
             true => None,
             false => PICTURES.iter().find_map(|extension| self.find(&with_suffix(&path, extension))),
@@ -51,12 +51,12 @@ impl Finder {
         longer.unwrap_or(path)
     }
 
-    /// The mask of `picture`, which a scene file calls by one of the `relative` paths.
+    /// The mask of `picture`, which the scene file refers to by one of the `relative` paths.
     pub(super) fn mask(&mut self, picture: &Path, relative: &[&Path]) -> Option<PathBuf> {
         self.companion(&MASK_FOLDERS, &MASKS, "mask", picture, relative)
     }
 
-    /// The depth map of `picture`, likewise.
+    /// The depth map of `picture`, which the scene file refers to by one of the `relative` paths.
     pub(super) fn depth(&mut self, picture: &Path, relative: &[&Path]) -> Option<PathBuf> {
         self.companion(&DEPTH_FOLDERS, &DEPTHS, "depth", picture, relative)
     }
@@ -85,14 +85,14 @@ impl Finder {
         None
     }
 
-    /// The scene's folder of this name, whatever the case of its letters.
+    /// The scene's folder of this name, in any case.
     fn folder(&mut self, name: &str) -> Option<PathBuf> {
         let exact = self.root.join(name);
         let found = if exact.is_dir() { Some(exact) } else { self.other_case(&exact) };
         found.filter(|folder| folder.is_dir())
     }
 
-    /// The file at `path`, or the one whose own name differs from it in case alone.
+    /// The file at `path`, or the one whose own name differs from it only in case.
     fn find(&mut self, path: &Path) -> Option<PathBuf> {
         if is_there(path) {
             Some(path.to_owned())
@@ -110,7 +110,7 @@ impl Finder {
     }
 }
 
-/// Paths in `folder` by the lower-case spelling of their names.
+/// Paths in `folder` by lower-case name.
 fn names_in(folder: &Path) -> HashMap<String, PathBuf> {
     let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let entries = std::fs::read_dir(here).into_iter().flatten().flatten();
@@ -124,14 +124,14 @@ fn names_in(folder: &Path) -> HashMap<String, PathBuf> {
 }
 
 impl Name {
-    /// Of the file `picture`, in the folder of `relative`.
+    /// The name of the file `picture` in the folder of `relative`.
     fn new(relative: &Path, picture: &Path) -> Self {
         let full = relative.with_file_name(picture.file_name().unwrap_or_default());
         let stem = if has_picture_extension(&full) { full.with_extension("") } else { full.clone() };
         Self { stem, full }
     }
 
-    /// Names without their last extension, in the order in which they are tried.
+    /// Names to try, without their last extension, in order.
     fn bases(&self, suffix: &str) -> [PathBuf; 4] {
         let joined = |mark: &str| {
             let mut longer = self.stem.clone().into_os_string();
@@ -152,7 +152,7 @@ pub(super) fn mask_names(picture: &Path, relative: &Path) -> String {
     format!("{first}/{{{}}}.{{{}}}, and the same in {second}/", bases.join(","), MASKS.join(","))
 }
 
-/// Whether a file is a picture by its name.
+/// Whether a file name has the extension of a picture.
 pub(super) fn has_picture_extension(path: &Path) -> bool {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     extension.is_some_and(|e| PICTURES.contains(&e.as_str()))
@@ -171,7 +171,7 @@ mod tests {
     use std::fs;
 
     #[test]
-    fn every_name_that_is_told_is_found_in_the_order_told() {
+    fn every_documented_name_is_found_in_the_documented_order() {
         let root = tempfile::tempdir().unwrap();
         let relative = Path::new("sub/a.jpg");
         let picture = root.path().join("images/sub/a.jpg");
@@ -196,9 +196,9 @@ mod tests {
     }
 
     #[test]
-    fn depth_formats_are_those_that_are_looked_for() {
+    fn every_extension_that_is_searched_for_is_a_depth_format() {
         for extension in DEPTHS {
-            DepthFormat::of(&with_suffix(Path::new("a"), extension)).unwrap();
+            DepthFormat::from_path(&with_suffix(Path::new("a"), extension)).unwrap();
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Depth maps from files: 16-bit PNG, float `.npy`, `.pfm` and `.exr`.
 //!
-//! A file's numbers times its unit are planar z in metres, whatever the gauge of the poses is. What is no
-//! measurement (0, NaN, infinite, negative) stays none.
+//! A file's numbers times its unit are planar z in metres, whatever the gauge of the poses. Values that are no
+//! measurement (0, NaN, infinite, negative) become 0 = none.
 
 use super::files::read_limited;
 use super::image::{Wanted, decode_gray16};
@@ -11,14 +11,14 @@ use std::path::Path;
 use vg_geometry::camera::MAX_SIDE;
 use vg_geometry::{Error, Result};
 
-/// Metres per unit of integers, where nothing says otherwise: millimetres, as nerfstudio and most depth cameras
-/// write. Floats are metres.
+/// Default metres per unit of integers: millimetres, as in files of nerfstudio and most depth cameras. Floats are
+/// metres.
 pub const MILLIMETRES: f64 = 1e-3;
 
 /// Longest depth file that is read: 8192 x 8192 doubles and a header.
 const MAX_FILE: u64 = 513 << 20;
 
-/// A depth file's format, known by its name.
+/// A depth file's format, determined by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DepthFormat {
     /// 16-bit grey PNG.
@@ -32,27 +32,27 @@ pub enum DepthFormat {
 }
 
 impl DepthFormat {
-    /// By the file name's extension.
-    pub fn of(path: &Path) -> Result<Self> {
+    /// The format of a file name's extension.
+    pub fn from_path(path: &Path) -> Result<Self> {
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         match extension.as_deref() {
             Some("png") => Ok(Self::Png),
             Some("npy") => Ok(Self::Npy),
             Some("pfm") => Ok(Self::Pfm),
             Some("exr") => Ok(Self::Exr),
-            _ => Err(Error::format(path, "extension", "no depth format; allowed: .png .npy .pfm .exr")),
+            _ => Err(Error::format(path, "extension", "not a depth format; allowed: .png .npy .pfm .exr")),
         }
     }
 }
 
-/// The depth map in `path`; `unit` is metres per number in the file, positive and finite. Without it integers are
-/// millimetres and floats metres.
+/// Reads the depth map in `path`; `unit` is metres per number in the file, positive and finite. Without a unit,
+/// integers are millimetres and floats metres.
 pub fn read(path: &Path, unit: impl Into<Option<f64>>) -> Result<DepthMap> {
-    let format = DepthFormat::of(path)?;
+    let format = DepthFormat::from_path(path)?;
     decode(format, &read_limited(path, MAX_FILE)?, path, unit)
 }
 
-/// The same from bytes; `path` is for messages only.
+/// Decodes a depth map from bytes; `path` is for messages only.
 pub fn decode(
     format: DepthFormat,
     bytes: &[u8],
@@ -62,9 +62,9 @@ pub fn decode(
     decode_wanted(format, bytes, path, unit.into(), None).map(|(map, _)| map)
 }
 
-/// The depth map in `path`, if it has the size that is wanted, and the unit that its numbers were taken in.
+/// Reads the depth map in `path`, which must have the wanted size; also returns the unit of its numbers.
 pub(crate) fn read_wanted(path: &Path, unit: Option<f64>, wanted: Wanted) -> Result<(DepthMap, f64)> {
-    let format = DepthFormat::of(path)?;
+    let format = DepthFormat::from_path(path)?;
     decode_wanted(format, &read_limited(path, MAX_FILE)?, path, unit, Some(wanted))
 }
 
@@ -107,7 +107,7 @@ fn decode_wanted(
     Ok((DepthMap::new(width, height, metres)?, unit))
 }
 
-/// A picture size from a header, once it is known to be one.
+/// A picture size from a header, checked against the allowed range.
 pub(super) fn checked_size(path: &Path, width: u64, height: u64) -> Result<(u32, u32)> {
     let allowed = 1..=u64::from(MAX_SIDE);
     if !allowed.contains(&width) || !allowed.contains(&height) {

@@ -1,4 +1,4 @@
-//! OpenEXR, as far as a depth map needs it: one flat layer with a channel named Z, depth, Y, V or R.
+//! OpenEXR depth maps: one flat layer with a channel named Z, depth, Y, V or R.
 
 use super::depth::checked_size;
 use super::image::Wanted;
@@ -9,14 +9,14 @@ use std::io::Cursor;
 use std::path::Path;
 use vg_geometry::{Error, Result};
 
-/// Most bytes of a block once it is unpacked, all channels together: 128 float channels of 8192 columns in the 16 rows
-/// that ZIP packs together. A block is decoded whole, in a few copies, whichever of its channels is wanted.
+/// Maximum size of an unpacked block, bytes, all channels together: 128 float channels of 8192 columns in the 16 rows
+/// that ZIP packs together. A block is decoded entirely, in a few copies, whichever of its channels is needed.
 const MAX_BLOCK: usize = 64 << 20;
 
-/// Width, height and values in row order. Other channels are decoded and dropped, block by block.
+/// Decodes width, height and values in row order. Other channels are decoded and dropped, block by block.
 pub(super) fn decode(bytes: &[u8], path: &Path, wanted: Option<Wanted>) -> Result<(u32, u32, Vec<f32>)> {
-    let failed = |e: exr::error::Error| Error::format(path, "exr", format!("{e}; allowed: a whole file"));
-    // The header first: its numbers are checked before anything is allocated by them.
+    let failed = |e: exr::error::Error| Error::format(path, "exr", format!("{e}; allowed: a complete file"));
+    // The header is checked before memory is allocated for the sizes in it.
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(failed)?;
     for header in &meta.headers {
         let size = checked_size(path, header.layer_size.width() as u64, header.layer_size.height() as u64)?;
@@ -61,16 +61,16 @@ pub(super) fn decode(bytes: &[u8], path: &Path, wanted: Option<Wanted>) -> Resul
     Ok((width, height, layer.channel_data.pixels.1))
 }
 
-/// The channel that says by its name that it is depth; where none does, the only colour or luminance.
+/// The channel named as depth, or else as luminance or red.
 fn depth_channel(meta: &MetaData, path: &Path) -> Result<Text> {
     let names = || meta.headers.iter().flat_map(|h| &h.channels.list).map(|channel| &channel.name);
     for wanted in ["z", "depth", "y", "v", "r"] {
-        // Renderers put the layer before it: `ViewLayer.Depth.Z`.
-        let answers = |name: &&Text| {
+        // Renderers prefix the layer: `ViewLayer.Depth.Z`.
+        let matches = |name: &&Text| {
             let name = name.to_string().to_ascii_lowercase();
             name == wanted || (name.ends_with(&format!(".{wanted}")) && ["z", "depth"].contains(&wanted))
         };
-        if let Some(name) = names().find(answers) {
+        if let Some(name) = names().find(matches) {
             return Ok(name.clone());
         }
     }
@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn channels_whose_blocks_would_fill_the_memory_are_refused_by_the_header() {
-        // 8192 columns in blocks of 16 rows take 512 kB a channel. One row is enough of a header.
+        // 8192 columns in blocks of 16 rows take 512 kB per channel. For the header, one row is enough.
         let wide = |channels: usize| {
             let samples = || FlatSamples::F32(vec![1.0; 8192]);
             let channel = |i: usize| AnyChannel::new(format!("c{i:04}").as_str(), samples());

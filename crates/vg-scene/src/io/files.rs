@@ -1,5 +1,5 @@
-//! What every reader and writer here needs of the file system: bounded reading, paths that stay inside the
-//! scene, and writing that never leaves half a file behind.
+//! File system functions of all readers and writers: bounded reading, paths that stay inside the scene, and atomic
+//! writing.
 
 use super::writes::writes;
 use std::fs::{self, File};
@@ -7,21 +7,21 @@ use std::io::{self, BufWriter, Read, Write};
 use std::path::{Component, Path, PathBuf};
 use vg_geometry::{Error, Result};
 
-/// The whole regular file, if it is not longer than `limit` bytes. A pipe or a device is refused before it is opened:
-/// opening a pipe that nobody writes to waits for ever.
+/// Reads a whole regular file of at most `limit` bytes. A pipe or a device is refused before it is opened:
+/// opening a pipe without a writer blocks for ever.
 pub(crate) fn read_limited(path: &Path, limit: u64) -> Result<Vec<u8>> {
     read_up_to(open_regular(path)?, path, limit)
 }
 
-/// As [`read_limited`], of a file that the caller named by itself, which may be a pipe.
+/// [`read_limited`] for a file that the caller named explicitly, which may be a pipe.
 pub(crate) fn read_limited_or_piped(path: &Path, limit: u64) -> Result<Vec<u8>> {
     read_up_to(File::open(path).map_err(|e| Error::io(path, e))?, path, limit)
 }
 
-/// Opens a regular file for reading; an error says what else is there.
+/// Opens a regular file for reading; an error names any other kind of file.
 pub(crate) fn open_regular(path: &Path) -> Result<File> {
     let io = |e| Error::io(path, e);
-    // Before it is opened, and again what was opened: the name may have changed hands between.
+    // Checked before and after opening: the name may refer to another file in between.
     refuse_special(path, &fs::metadata(path).map_err(io)?)?;
     let file = File::open(path).map_err(io)?;
     refuse_special(path, &file.metadata().map_err(io)?)?;
@@ -46,7 +46,7 @@ fn read_up_to(file: File, path: &Path, limit: u64) -> Result<Vec<u8>> {
         return Err(too_long(meta.len()));
     }
     let mut bytes = Vec::with_capacity(meta.len() as usize);
-    // A pipe states no length; a file may grow meanwhile.
+    // A pipe has no length; a file may grow meanwhile.
     file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, e))?;
     if bytes.len() as u64 > limit {
         return Err(too_long(bytes.len() as u64));
@@ -54,14 +54,14 @@ fn read_up_to(file: File, path: &Path, limit: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Whether something other than a folder has this name. What is there need not be readable: reading it says why.
+/// Whether something other than a folder has this name. It need not be readable: reading it reports the error.
 pub(crate) fn is_there(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|meta| !meta.is_dir())
 }
 
-/// A path written in a scene file: relative, and inside the scene's folder, so that a scene from elsewhere
-/// reads nothing but itself. Backslashes are taken for slashes, as Windows writes them. The error is the reason,
-/// without file and field.
+/// Checks a path from a scene file: it must be relative and inside the scene's folder, so that a foreign scene
+/// reads only its own files. Backslashes, as in files from Windows, count as slashes. The error is the reason without
+/// file and field.
 pub(crate) fn relative_inside(text: &str) -> std::result::Result<PathBuf, String> {
     let leads_out =
         || Err(format!("{text:?} leads out of the scene's folder; allowed: a relative path without .."));
@@ -81,7 +81,7 @@ pub(crate) fn relative_inside(text: &str) -> std::result::Result<PathBuf, String
     Ok(inside)
 }
 
-/// An argument error raised while a file was read, as an error of that file: its argument is the field.
+/// Converts an argument error raised while a file was read to an error of that file; the argument becomes the field.
 pub(crate) fn in_file(path: &Path, error: Error) -> Error {
     match error {
         Error::Argument { argument, found, allowed } => {
@@ -91,15 +91,15 @@ pub(crate) fn in_file(path: &Path, error: Error) -> Error {
     }
 }
 
-/// Links that are followed, as many as Linux follows.
+/// Maximum of links that are followed, as in Linux.
 const MAX_LINKS: usize = 40;
 
-/// Writes `path` by way of a temporary file in the same folder that replaces it at the end: when anything
-/// fails, what was there before is still there. What replaces a file is on the disk before it does, and has the file's
-/// permissions. Devices and pipes are written to directly.
+/// Writes `path` through a temporary file in the same folder that replaces it at the end: if anything fails, the old
+/// file remains. The new file is synchronised to disk before it replaces the old one, and gets its permissions. Devices
+/// and pipes are written directly.
 pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
     let failed = |e| Error::io(path, explained(e));
-    // Through a link, so that the link stays a link.
+    // Resolve links, so that a link stays a link.
     let target = resolved(path);
     let permissions = match fs::metadata(&target) {
         Ok(meta) if meta.is_dir() => {
@@ -121,7 +121,7 @@ fn replace(
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
     let mut temporary = temporary_in(folder_of(target))?;
-    // To the file itself: its errors do not tell the temporary name.
+    // Write to the file itself: its errors do not contain the temporary name.
     let file = temporary.as_file_mut();
     let mut out = BufWriter::with_capacity(1 << 16, writes().stoppable(&mut *file));
     write(&mut out)?;
@@ -139,22 +139,22 @@ fn replace(
 fn temporary_in(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".vg-").suffix(".part");
-    // Temporary files are private by default; this one becomes an ordinary file, as the umask says.
+    // Temporary files are private by default; this one becomes an ordinary file with the umask's permissions.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     builder.tempfile_in(folder).map_err(|e| {
-        // Without the temporary name, which says nothing to a user.
+        // Remove the temporary name, which is meaningless to a user.
         let text = e.to_string();
         io::Error::new(e.kind(), text.split(" at path ").next().unwrap_or(&text).to_owned())
     })
 }
 
-/// Makes sure that files can be made in `folder`, by making one and removing it.
+/// Checks that files can be created in `folder` by creating and removing one.
 pub fn check_folder(folder: &Path) -> Result<()> {
     writes().run(|| temporary_in(folder).map(drop)).map_err(|e| Error::io(folder, e))
 }
 
-/// Whether `folder`, which must take files, takes two names for one that differ in upper and lower case alone.
+/// Whether the file system of `folder`, which must be writable, ignores case in names.
 pub fn folds_case(folder: &Path) -> bool {
     let probe = || {
         let file = temporary_in(folder)?;
@@ -164,8 +164,8 @@ pub fn folds_case(folder: &Path) -> bool {
     writes().run(probe).unwrap_or(false)
 }
 
-/// The file that a write to `path` would make or replace, by its one absolute name: links are followed, those that lead
-/// to nothing yet too. Where a folder on the way does not exist yet, `..` takes back a name.
+/// The canonical absolute path of the file that a write to `path` would create or replace. Links are followed, even to
+/// files that do not exist yet. After a folder that does not exist yet, `..` removes its name.
 pub fn resolved(path: &Path) -> PathBuf {
     follow(path, MAX_LINKS)
 }
@@ -188,7 +188,7 @@ fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// The system's words, and the limit where this process met its own.
+/// The system's error, with the process's limit if the file exceeds it.
 fn explained(e: io::Error) -> io::Error {
     match largest_file().filter(|_| e.kind() == io::ErrorKind::FileTooLarge) {
         Some(limit) => {
@@ -199,7 +199,7 @@ fn explained(e: io::Error) -> io::Error {
     }
 }
 
-/// Bytes that a file may have by the limits of this process.
+/// Maximum size of a file by the limits of this process, bytes.
 #[cfg(unix)]
 fn largest_file() -> Option<u64> {
     rustix::process::getrlimit(rustix::process::Resource::Fsize).current
@@ -232,7 +232,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_replaced_file_keeps_its_mode_and_a_new_one_has_that_of_the_umask() {
+    fn a_replaced_file_keeps_its_mode_and_a_new_one_follows_the_umask() {
         use std::os::unix::fs::PermissionsExt;
         let dir = tempfile::tempdir().unwrap();
         let (old, new) = (dir.path().join("old.ply"), dir.path().join("new.ply"));
@@ -248,7 +248,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn every_spelling_of_a_file_that_is_not_there_is_resolved_to_one() {
+    fn every_spelling_of_a_missing_file_resolves_to_one_path() {
         use std::os::unix::fs::symlink;
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
@@ -268,7 +268,7 @@ mod tests {
         }
         assert_eq!(resolved(&at("loop")).file_name().unwrap(), "loop");
         assert_eq!(resolved(Path::new("new.ply")), fs::canonicalize(".").unwrap().join("new.ply"));
-        // What is written through a link leaves the link.
+        // A write through a link leaves the link.
         write_atomically(&at("a/dangling.ply"), |out| out.write_all(b"new")).unwrap();
         assert!(at("a/dangling.ply").is_symlink() && expected.is_file());
     }

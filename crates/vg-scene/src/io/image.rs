@@ -1,4 +1,4 @@
-//! Pictures and masks from PNG and JPEG files, and PNG files of what was rendered.
+//! Pictures and masks from PNG and JPEG files, and PNG output.
 
 use super::files::{in_file, open_regular, read_limited, write_atomically};
 use super::mask;
@@ -16,53 +16,53 @@ use vg_geometry::{Error, Result};
 /// many bytes uncompressed.
 const MAX_FILE: u64 = 512 << 20;
 
-/// A picture, with its alpha channel where it has one.
+/// A picture with its alpha channel, if it has one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
-    /// Colour as stored; transparent pixels keep theirs.
+    /// Colour as stored, also of transparent pixels.
     pub image: RgbImage,
-    /// Alpha in row order, `[height * width]`. `None` also where every pixel is opaque: that says nothing.
+    /// Alpha in row order, `[height * width]`. `None` also if every pixel is opaque: such alpha is no mask.
     pub alpha: Option<Vec<u8>>,
 }
 
-/// What a picture is read for.
+/// The expected size and pixel order of a picture.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wanted {
-    /// Width and height that it must have.
+    /// Required width and height.
     pub(crate) size: (u32, u32),
-    /// Whose size that is, for messages.
+    /// Source of that size, for messages.
     pub(crate) whose: &'static str,
-    /// Which of its pixels are meant where EXIF turns it.
+    /// Pixel order of the camera if EXIF rotates the picture.
     pub(crate) exif: ExifPixels,
 }
 
-/// The pixels in which the camera of a picture is given that has an EXIF orientation.
+/// The pixel order in which the camera of a picture with an EXIF orientation is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ExifPixels {
-    /// As stored unless only the turned picture has the size: COLMAP reads pictures so.
+    /// As stored, like COLMAP, unless only the rotated picture has the size.
     Stored,
-    /// Stored or turned (OpenCV reads pictures so), whichever has the size; where both have it is an error.
+    /// As stored or rotated (like OpenCV), whichever has the size; an error if both have.
     BySize,
 }
 
 impl Wanted {
-    /// Compares a size that nothing turns.
+    /// Checks the size of a picture without an EXIF orientation.
     pub(crate) fn check_size(&self, path: &Path, found: (u32, u32)) -> Result<()> {
         turn(path, found, Orientation::NoTransforms, Some(*self)).map(|_| ())
     }
 }
 
-/// A PNG or JPEG picture. One that EXIF turns is refused: nothing here tells which of its pixels are meant.
+/// Reads a PNG or JPEG picture. One with an EXIF orientation is refused: the camera's pixel order is unknown.
 pub fn read(path: &Path) -> Result<Picture> {
     decode(&read_limited(path, MAX_FILE)?, path)
 }
 
-/// The same from bytes; `path` is for messages only.
+/// Decodes a picture from bytes, as [`read`]; `path` is for messages only.
 pub fn decode(bytes: &[u8], path: &Path) -> Result<Picture> {
     picture(decode_any(bytes, path, None)?)
 }
 
-/// The picture in a file, if it is the one that is wanted, which its header tells before a pixel is decoded.
+/// Reads the picture in a file; its size is checked in the header before a pixel is decoded.
 pub(crate) fn read_wanted(path: &Path, wanted: Wanted) -> Result<Picture> {
     picture(decode_any(&read_limited(path, MAX_FILE)?, path, Some(wanted))?)
 }
@@ -74,33 +74,33 @@ fn picture(decoded: DynamicImage) -> Result<Picture> {
     Ok(Picture { image: RgbImage::from_owner("image", width, height, rgb.into_raw())?, alpha })
 }
 
-/// The mask in a PNG, JPEG or NumPy file; docs/SCENES.md says what is vehicle in it.
+/// Reads the mask in a PNG, JPEG or NumPy file; docs/SCENES.md defines which pixels are vehicle.
 pub fn read_mask(path: &Path) -> Result<Mask> {
     mask::decode(&read_limited(path, MAX_FILE)?, path, None)
 }
 
-/// The same of a mask of the size that is wanted.
+/// [`read_mask`] with a check of the size.
 pub(crate) fn read_mask_wanted(path: &Path, wanted: Wanted) -> Result<Mask> {
     mask::decode(&read_limited(path, MAX_FILE)?, path, Some(wanted))
 }
 
 /// A mask from the alpha of the picture in `path`.
-pub(crate) fn mask_of_alpha(path: &Path, width: u32, height: u32, alpha: &[u8]) -> Result<Mask> {
+pub(crate) fn mask_from_alpha(path: &Path, width: u32, height: u32, alpha: &[u8]) -> Result<Mask> {
     Mask::from_strided("alpha", alpha, width, height, width as usize).map_err(|e| in_file(path, e))
 }
 
-/// Width and height, from the header alone.
+/// Width and height of a picture, from the header alone.
 pub fn size(path: &Path) -> Result<(u32, u32)> {
     let reader = ImageReader::new(BufReader::new(open_regular(path)?));
     let reader = reader.with_guessed_format().map_err(|e| Error::io(path, e))?;
     let mut decoder = reader.into_decoder().map_err(|e| image_error(path, e))?;
     let size = decoder.dimensions();
     check_size(path, size)?;
-    turn(path, size, exif_of(&mut decoder), None)?;
+    turn(path, size, exif_orientation(&mut decoder), None)?;
     Ok(size)
 }
 
-/// 16-bit grey values in row order, and the size.
+/// Decodes the size and 16-bit grey values in row order.
 pub(crate) fn decode_gray16(
     bytes: &[u8],
     path: &Path,
@@ -116,7 +116,7 @@ pub(crate) fn decode_gray16(
     }
 }
 
-/// The pixels of a PNG or a JPEG, turned as EXIF says where those are wanted.
+/// Decodes a PNG or a JPEG, rotated by its EXIF orientation if `wanted` requires it.
 pub(super) fn decode_any(bytes: &[u8], path: &Path, wanted: Option<Wanted>) -> Result<DynamicImage> {
     let mut reader =
         ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| Error::io(path, e))?;
@@ -136,25 +136,25 @@ pub(super) fn decode_any(bytes: &[u8], path: &Path, wanted: Option<Wanted>) -> R
     let mut decoder = reader.into_decoder().map_err(|e| image_error(path, e))?;
     let size = decoder.dimensions();
     check_size(path, size)?;
-    let turn = turn(path, size, exif_of(&mut decoder), wanted)?;
+    let turn = turn(path, size, exif_orientation(&mut decoder), wanted)?;
     let mut decoded = DynamicImage::from_decoder(decoder).map_err(|e| image_error(path, e))?;
     decoded.apply_orientation(turn);
     Ok(decoded)
 }
 
-/// The orientation that the file states; a tag that cannot be read states none.
-fn exif_of(decoder: &mut impl ImageDecoder) -> Orientation {
+/// The EXIF orientation of a file; a tag that cannot be read counts as none.
+fn exif_orientation(decoder: &mut impl ImageDecoder) -> Orientation {
     decoder.orientation().unwrap_or(Orientation::NoTransforms)
 }
 
-/// How the stored pixels, `stored` in size, are to be turned to be the ones that are wanted.
+/// The rotation that takes the stored pixels, of size `stored`, to the wanted ones.
 fn turn(path: &Path, stored: (u32, u32), exif: Orientation, wanted: Option<Wanted>) -> Result<Orientation> {
     use Orientation::{NoTransforms, Rotate90, Rotate90FlipH, Rotate270, Rotate270FlipH};
-    let lies = matches!(exif, Rotate90 | Rotate270 | Rotate90FlipH | Rotate270FlipH);
-    let shown = if lies { (stored.1, stored.0) } else { stored };
+    let swaps_sides = matches!(exif, Rotate90 | Rotate270 | Rotate90FlipH | Rotate270FlipH);
+    let shown = if swaps_sides { (stored.1, stored.0) } else { stored };
     let unclear = || {
         let reason = format!(
-            "{}, and the camera may be given in the pixels as stored (as COLMAP reads them) or as shown (as OpenCV does); allowed: 1. Where the camera is in the pixels as stored, drop the tag (exiftool -Orientation= FILE); where it is in those as shown, turn the pixels (mogrify -auto-orient FILE)",
+            "{}, and the camera may refer to the pixels as stored (as COLMAP reads them) or as shown (as OpenCV does); allowed: 1. If it refers to the pixels as stored, drop the tag (exiftool -Orientation= FILE); if to the pixels as shown, rotate the pixels (mogrify -auto-orient FILE)",
             exif.to_exif()
         );
         Err(Error::format(path, "EXIF orientation", reason))
@@ -189,12 +189,12 @@ fn check_size(path: &Path, (width, height): (u32, u32)) -> Result<()> {
 fn image_error(path: &Path, error: image::ImageError) -> Error {
     match error {
         image::ImageError::IoError(e) if e.kind() != std::io::ErrorKind::UnexpectedEof => Error::io(path, e),
-        other => Error::format(path, "picture", format!("{other}; allowed: a whole PNG or JPEG")),
+        other => Error::format(path, "picture", format!("{other}; allowed: a complete PNG or JPEG")),
     }
 }
 
-/// The decoder fills what is missing of a truncated JPEG with grey and says nothing. An end-of-image marker
-/// cannot occur inside coded data, so one after the first scan's start means that the file is whole.
+/// Returns an error if a JPEG is truncated: the decoder silently fills the missing part with grey. An end-of-image
+/// marker cannot occur inside coded data, so one after the first scan's start means that the file is complete.
 fn jpeg_is_whole(bytes: &[u8], path: &Path) -> Result<()> {
     const START_OF_SCAN: u8 = 0xda;
     const END_OF_IMAGE: [u8; 2] = [0xff, 0xd9];
@@ -206,10 +206,10 @@ fn jpeg_is_whole(bytes: &[u8], path: &Path) -> Result<()> {
             Some(&[0xff, marker, high, low]) if marker != START_OF_SCAN => {
                 at += 2 + usize::from(u16::from_be_bytes([high, low]));
             }
-            // Something between the segments: the decoder knows better what may be there.
+            // Other bytes between the segments are left to the decoder.
             Some(&[other, ..]) if other != 0xff => break,
             _ => {
-                let reason = "ends before its end-of-image marker; allowed: a whole JPEG";
+                let reason = "ends before its end-of-image marker; allowed: a complete JPEG";
                 return Err(Error::format(path, "picture", reason));
             }
         }
@@ -217,7 +217,7 @@ fn jpeg_is_whole(bytes: &[u8], path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Alpha in row order, where a pixel is transparent at all.
+/// Alpha in row order, if any pixel is transparent.
 pub(super) fn transparency(decoded: &DynamicImage) -> Option<Vec<u8>> {
     if !decoded.color().has_alpha() {
         return None;
@@ -230,17 +230,17 @@ pub(super) fn transparency(decoded: &DynamicImage) -> Option<Vec<u8>> {
     alpha.iter().any(|&a| a != u8::MAX).then_some(alpha)
 }
 
-/// An RGB picture as an 8-bit PNG, replacing what was there only once it is complete.
+/// Writes an RGB picture as an 8-bit PNG; an existing file is replaced once the new one is complete.
 pub fn write_rgb8(path: &Path, width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<()> {
     write_png(path, width, height, pixels.as_flattened(), ExtendedColorType::Rgb8)
 }
 
-/// An RGBA picture with straight alpha as an 8-bit PNG.
+/// Writes an RGBA picture with straight alpha as an 8-bit PNG.
 pub fn write_rgba8(path: &Path, width: u32, height: u32, pixels: &[[u8; 4]]) -> Result<()> {
     write_png(path, width, height, pixels.as_flattened(), ExtendedColorType::Rgba8)
 }
 
-/// A mask as an 8-bit grey PNG: 255 where vehicle, 0 elsewhere (unknown too).
+/// Writes a mask as an 8-bit grey PNG: 255 for vehicle pixels, 0 for all others (also unknown).
 pub fn write_mask(path: &Path, mask: &Mask) -> Result<()> {
     let value = |l: &crate::mask::Label| {
         if *l as u8 >= VEHICLE_THRESHOLD { u8::MAX } else { 0 }
@@ -249,8 +249,8 @@ pub fn write_mask(path: &Path, mask: &Mask) -> Result<()> {
     write_png(path, mask.width(), mask.height(), &values, ExtendedColorType::L8)
 }
 
-/// Depth in metres as a 16-bit PNG of millimetres, 0 = none. Returns how many measured pixels lie beyond the
-/// 65.535 m that fit and were written as none; a measurement below 1 mm becomes 1 mm, so that it stays one.
+/// Writes depth in metres as a 16-bit PNG of millimetres, 0 = none. Returns the number of measured pixels beyond the
+/// limit of 65.535 m, which are written as none; a measurement below 1 mm becomes 1 mm, so that it remains one.
 pub fn write_depth16(path: &Path, width: u32, height: u32, depth: &[f32]) -> Result<usize> {
     let mut left_out = 0;
     let mut bytes = Vec::with_capacity(depth.len() * 2);
@@ -314,7 +314,7 @@ mod tests {
         assert_eq!(decoded.image.pixels()[..3], [[0; 3], [100; 3], [200; 3]]);
     }
 
-    /// A JPEG whose EXIF tells this orientation.
+    /// A JPEG with this EXIF orientation.
     fn turned(width: u32, height: u32, orientation: u8) -> Vec<u8> {
         let mut jpeg = Cursor::new(Vec::new());
         let bright_top = |_, v| image::Luma([if v < height / 2 { 250 } else { 5 }]);
@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn exif_turns_a_picture_where_the_camera_s_size_says_so_and_is_refused_where_it_cannot() {
+    fn exif_rotates_a_picture_if_the_camera_s_size_requires_it_and_is_refused_if_ambiguous() {
         let path = Path::new("a.jpg");
         let read = |width, height, orientation, size, exif| {
             let wanted = Wanted { size, whose: "its camera", exif };
@@ -338,14 +338,14 @@ mod tests {
         let upright = read(16, 8, 1, (16, 8), BySize).unwrap();
         assert!(upright.get_pixel(8, 1)[0] > 200 && upright.get_pixel(8, 6)[0] < 50);
         for exif in [BySize, Stored] {
-            // Sides change places: the size tells.
+            // The sides are swapped: the size decides.
             assert_eq!(read(16, 8, 6, (16, 8), exif).unwrap(), upright);
             let shown = read(16, 8, 6, (8, 16), exif).unwrap();
             assert!(shown.get_pixel(6, 8)[0] > 200 && shown.get_pixel(1, 8)[0] < 50, "{exif:?}");
             let error = read(16, 8, 6, (9, 16), exif).unwrap_err().to_string();
             assert!(error.contains("size: 16x8 (EXIF orientation 6), but its camera is 9x16"), "{error}");
         }
-        // They do not: only COLMAP's way of reading is known.
+        // The sides are not swapped: only COLMAP's convention is unambiguous.
         for (width, orientation) in [(16, 2), (16, 3), (16, 4), (8, 6), (8, 8)] {
             let error = read(width, 8, orientation, (width, 8), BySize).unwrap_err().to_string();
             assert!(error.contains(&format!("a.jpg: EXIF orientation: {orientation}")), "{error}");

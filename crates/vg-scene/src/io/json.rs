@@ -1,4 +1,4 @@
-//! JSON with errors that say where in the document they are.
+//! JSON with errors that contain their place in the document.
 
 use serde::de::DeserializeOwned;
 use std::path::Path;
@@ -7,9 +7,9 @@ use vg_geometry::{Error, Result};
 /// Longest JSON file that is read. Four thousand frames take about 4 MB.
 pub(super) const MAX_FILE: u64 = 64 << 20;
 
-/// The document, or an error whose field is the path to the value: `frames[3].transform_matrix[0]`.
+/// Parses a document; the field of an error is the path to the value: `frames[3].transform_matrix[0]`.
 pub(super) fn parse<T: DeserializeOwned>(bytes: &[u8], path: &Path) -> Result<T> {
-    // Written by some editors, refused by the parser.
+    // The byte order mark that some editors write is refused by the parser.
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut deserializer = serde_json::Deserializer::from_slice(bytes);
     let value = serde_path_to_error::deserialize(&mut deserializer).map_err(|e| {
@@ -23,7 +23,7 @@ pub(super) fn parse<T: DeserializeOwned>(bytes: &[u8], path: &Path) -> Result<T>
     Ok(value)
 }
 
-/// The same of a document that is an object; without this, an array would be taken for the keys' values in order.
+/// [`parse`] for a document that must be an object; otherwise an array would count as the keys' values in order.
 pub(super) fn parse_object<T: DeserializeOwned>(bytes: &[u8], path: &Path) -> Result<T> {
     match bytes.trim_ascii_start().first() {
         Some(b'[' | b'"' | b'0'..=b'9' | b'-') => {

@@ -1,7 +1,7 @@
-//! What a scene on disk consists of, before any pixel is read: pictures' names, cameras, and files.
+//! Listing of a scene on disk before any pixel is read: names of pictures, cameras, and files.
 //!
-//! Poses are those of the files, `world_from_camera`; whether that world is the vehicle's frame is for
-//! [`super::scene`] to settle.
+//! Poses are those of the files, `world_from_camera`; [`super::scene`] decides whether that world is the vehicle's
+//! frame.
 
 use super::beside::{Finder, mask_names};
 use super::files::{is_there, read_limited};
@@ -18,15 +18,15 @@ use vg_geometry::{Error, Result};
 pub(super) struct Listing {
     /// The file or folder that holds the poses.
     pub(super) source: PathBuf,
-    /// In the file's order; COLMAP's images by name.
+    /// Views in the file's order; COLMAP's images by name.
     pub(super) views: Vec<ListedView>,
-    /// Why the world of the poses is not the vehicle's frame, if it is not: field and reason.
+    /// Field and reason, if the world of the poses is not the vehicle's frame.
     pub(super) not_vehicle_frame: Option<(&'static str, &'static str)>,
     /// The folder of a COLMAP model, which may have sparse points.
     pub(super) sparse_model: Option<PathBuf>,
     /// The vehicle's box in the world of the poses.
     pub(super) vehicle_box: Option<VehicleBox>,
-    /// What was chosen among several, a sentence each.
+    /// Notes on choices among several candidates, a sentence each.
     pub(super) notes: Vec<String>,
 }
 
@@ -34,9 +34,9 @@ pub(super) struct Listing {
 #[derive(Clone, Debug)]
 pub(super) struct ListedView {
     pub(super) name: String,
-    /// As the scene file writes it.
+    /// The path in the scene file, verbatim.
     pub(super) path_in_file: String,
-    /// `vehicle_from_camera` still holds `world_from_camera`.
+    /// Camera whose `vehicle_from_camera` still holds `world_from_camera`.
     pub(super) camera: Camera,
     pub(super) image: PathBuf,
     pub(super) mask: Option<PathBuf>,
@@ -45,17 +45,18 @@ pub(super) struct ListedView {
     pub(super) mask_names: String,
 }
 
-/// A depth file and what its numbers mean.
+/// A depth file and the unit of its numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthFile {
     /// PNG, NPY, PFM or EXR.
     pub path: PathBuf,
-    /// Metres per number in the file, where the scene or the caller says; else integers are millimetres, floats metres.
+    /// Metres per number in the file, if the scene or the caller gives it; else integers are millimetres, floats
+    /// metres.
     pub unit: Option<f64>,
 }
 
-/// Lists the scene at `path`: a `transforms.json`, a folder with one, or else a COLMAP folder; or only what
-/// `format` asks for.
+/// Lists the scene at `path`: a `transforms.json`, a folder with one, or else a COLMAP folder; only one of `format` if
+/// that is given.
 pub(super) fn list(path: &Path, format: Option<SceneFormat>) -> Result<Listing> {
     let meta = std::fs::metadata(path).map_err(|e| Error::io(path, e))?;
     if meta.is_file() {
@@ -82,7 +83,7 @@ pub(super) fn find_colmap(path: &Path) -> Option<colmap::Found> {
     colmap::find(path).or_else(|| realcar::find_model(path))
 }
 
-const NO_SCENE: &str = "neither a transforms.json, nor a folder with one, nor a folder with a COLMAP model (cameras.bin and images.bin, or .txt, in sparse/0 or another number, in sparse, in itself, or as 3DRealCar has it in colmap_processed/pcd_rescale)";
+const NO_SCENE: &str = "neither a transforms.json, nor a folder with one, nor a folder with a COLMAP model (cameras.bin and images.bin, or .txt, in sparse/0 or another number, in sparse, in the folder itself, or in colmap_processed/pcd_rescale as in 3DRealCar)";
 
 fn list_transforms(path: &Path) -> Result<Listing> {
     let file = transforms::parse(&read_limited(path, json::MAX_FILE)?, path)?;
@@ -123,7 +124,7 @@ fn list_transforms(path: &Path) -> Result<Listing> {
     }
     refuse_repeated(path, "file_path", &views)?;
     let not_vehicle_frame = file.moved_by.map(|key| {
-        (key, "says that the poses were moved, so that their world need not be the vehicle's frame. Pass the similarity from these poses to the vehicle's frame (--vehicle-from-world FILE), or drop the key if they are in it")
+        (key, "set, so the poses were moved and may not be in the vehicle's frame. Pass the similarity from these poses to the vehicle's frame (--vehicle-from-world FILE), or drop the key if they are in the vehicle's frame")
     });
     Ok(Listing {
         source: path.to_owned(),
@@ -135,7 +136,7 @@ fn list_transforms(path: &Path) -> Result<Listing> {
     })
 }
 
-/// The folder that all pictures of a `transforms.json` lie in, by its first name.
+/// First component of the path of all pictures of a `transforms.json`, if they share it.
 fn common_folder(frames: &[transforms::Frame]) -> Option<&OsStr> {
     fn first(frame: &transforms::Frame) -> Option<&OsStr> {
         let mut names = frame.file_path.iter();
@@ -145,7 +146,7 @@ fn common_folder(frames: &[transforms::Frame]) -> Option<&OsStr> {
     frames.iter().all(|frame| first(frame) == Some(folder)).then_some(folder)
 }
 
-/// `found` is the model, at or below `path`.
+/// Lists the COLMAP model `found` at or below `path`.
 fn list_colmap(path: &Path, found: colmap::Found) -> Result<Listing> {
     let model = found.folder;
     let root = colmap_root(path, &model);
@@ -160,7 +161,7 @@ fn list_colmap(path: &Path, found: colmap::Found) -> Result<Listing> {
         let mask_names = mask_names(&picture, &image.name);
         Ok(ListedView { path_in_file: name.clone(), name, camera, image: picture, mask, depth, mask_names })
     });
-    let reason = "missing: where a COLMAP model lies, how it is turned and how large it is are arbitrary, so that it is not in the vehicle's frame. Pass the similarity from the model to the vehicle's frame (--vehicle-from-world FILE)";
+    let reason = "missing: the position, rotation and scale of a COLMAP model are arbitrary, so it is not in the vehicle's frame. Pass the similarity from the model to the vehicle's frame (--vehicle-from-world FILE)";
     Ok(Listing {
         views: views.collect::<Result<_>>()?,
         not_vehicle_frame: Some(("vehicle_from_world", reason)),
@@ -171,15 +172,15 @@ fn list_colmap(path: &Path, found: colmap::Found) -> Result<Listing> {
     })
 }
 
-/// The folder that holds `images/`: the model's own or one above it, else the one given.
+/// The folder that contains `images/`: the model's own or one above it, else the given one.
 fn colmap_root(path: &Path, model: &Path) -> PathBuf {
-    // A relative path such as "." has ancestors too, once it is made absolute.
+    // A relative path such as "." has all its ancestors only as an absolute path.
     let absolute = std::path::absolute(model).unwrap_or_else(|_| model.to_owned());
     let root = absolute.ancestors().take(3).find(|folder| folder.join("images").is_dir());
     root.map_or_else(|| path.to_owned(), Path::to_owned)
 }
 
-/// Two entries of one picture would be two views with one name.
+/// Returns an error if a picture is listed twice: the two views would have the same name.
 pub(super) fn refuse_repeated(path: &Path, field: &str, views: &[ListedView]) -> Result<()> {
     let mut seen = std::collections::HashMap::new();
     for (i, view) in views.iter().enumerate() {

@@ -13,9 +13,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use vg_geometry::progress::Watch;
 use vg_geometry::{Error, Result};
 
-/// The scene of these views, and notes on what is legal but looks like a mistake.
+/// Loads the scene of these views; also returns notes on legal input that looks like a mistake.
 pub(super) fn load(views: &[SceneView], exif: ExifPixels, watch: &Watch) -> Result<(Scene, Vec<String>)> {
-    // Before a picture is decoded, not after all are.
+    // Check the number before any picture is decoded.
     if views.is_empty() || views.len() > MAX_VIEWS {
         return Err(Error::argument("views", views.len().to_string(), format!("1 to {MAX_VIEWS}")));
     }
@@ -38,23 +38,23 @@ pub(super) fn load(views: &[SceneView], exif: ExifPixels, watch: &Watch) -> Resu
 
 fn load_view(listed: &SceneView, exif: ExifPixels) -> Result<(View, Option<String>)> {
     let size = (listed.camera.width, listed.camera.height);
-    let of = |whose| Wanted { size, whose, exif };
+    let wanted = |whose| Wanted { size, whose, exif };
     if !has_picture_extension(&listed.image) && !is_there(&listed.image) {
         let tried: Vec<String> = PICTURES.iter().map(|extension| format!(".{extension}")).collect();
-        let reason = format!("no such file, nor one with {} added", tried.join(", "));
+        let reason = format!("no such file, and none with {} added", tried.join(", "));
         return Err(Error::format(&listed.image, "picture", reason));
     }
-    let picture = image::read_wanted(&listed.image, of("its camera"))?;
+    let picture = image::read_wanted(&listed.image, wanted("its camera"))?;
     let mask = match (&listed.mask, &picture.alpha) {
-        (Some(path), _) => Some(image::read_mask_wanted(path, of("its picture"))?),
-        (None, Some(alpha)) => Some(image::mask_of_alpha(&listed.image, size.0, size.1, alpha)?),
+        (Some(path), _) => Some(image::read_mask_wanted(path, wanted("its picture"))?),
+        (None, Some(alpha)) => Some(image::mask_from_alpha(&listed.image, size.0, size.1, alpha)?),
         (None, None) => None,
     };
     let mut doubt = None;
     let depth = match &listed.depth {
         None => None,
         Some(file) => {
-            let (map, unit) = depth::read_wanted(&file.path, file.unit, of("its picture"))?;
+            let (map, unit) = depth::read_wanted(&file.path, file.unit, wanted("its picture"))?;
             doubt = implausible_depth(&file.path, map.depth(), unit);
             Some(map)
         }
@@ -63,32 +63,33 @@ fn load_view(listed: &SceneView, exif: ExifPixels) -> Result<(View, Option<Strin
     Ok((view, doubt))
 }
 
-/// One sentence on all views that have no mask, with the names that were tried.
+/// A note on all views without a mask, with the names that were tried.
 fn unmasked(listed: &[SceneView], views: &[View]) -> Option<String> {
-    /// How many views it names.
+    /// Maximum of views that the note names.
     const SHOWN: usize = 8;
     let without = listed.iter().zip(views).filter(|(_, view)| view.mask.is_none());
     let unmasked: Vec<&SceneView> = without.map(|(listed, _)| listed).collect();
     let tried = &unmasked.first()?.mask_names;
     if unmasked.len() == views.len() {
-        return Some(format!("no view has a mask: looked for {tried}"));
+        return Some(format!("no view has a mask; searched for {tried}"));
     }
     let names: Vec<&str> = unmasked.iter().take(SHOWN).map(|view| view.name.as_str()).collect();
     let more = if unmasked.len() > SHOWN { ", ..." } else { "" };
-    Some(format!("{}{more}: no mask, though other views have one: looked for {tried}", names.join(", ")))
+    Some(format!("{}{more}: no mask, although other views have one; searched for {tried}", names.join(", ")))
 }
 
-/// Vehicles are photographed from metres away; a median outside 5 cm to 500 m is a wrong unit.
+/// A warning if the median depth is outside 5 cm to 500 m: vehicles are photographed from metres away, so the unit is
+/// probably wrong.
 fn implausible_depth(path: &Path, depth: &[f32], unit: f64) -> Option<String> {
     let mut measured: Vec<f32> = depth.iter().copied().filter(|&d| d > 0.0).collect();
     let middle = measured.len() / 2;
     let median = match measured.len() {
-        0 => return Some(format!("{}: no pixel holds a measurement", path.display())),
+        0 => return Some(format!("{}: no pixel has a measurement", path.display())),
         _ => *measured.select_nth_unstable_by(middle, f32::total_cmp).1,
     };
     (!(0.05..=500.0).contains(&median)).then(|| {
         format!(
-            "{}: the median depth is {median} m with {unit} m per unit: is the unit right?",
+            "{}: the median depth is {median} m with {unit} m per unit; is the unit right?",
             path.display()
         )
     })

@@ -1,11 +1,11 @@
-//! Masks from files, read as far as they can be read in one way only.
+//! Masks from files, if their meaning is unambiguous.
 //!
-//! - Transparent somewhere: a cut-out, its alpha counts.
+//! - Pictures with transparent pixels: a cut-out, whose alpha is the mask.
 //! - Two colours, one of them black: the other is vehicle, whatever it is (1 of 0 and 1, a palette's colour, 16 bits).
 //! - Grey: [`VEHICLE_THRESHOLD`] and above is vehicle.
 //! - NumPy arrays: true, 1 of 0 and 1, or the threshold and above.
 //!
-//! Everything else is an error: grey that stays below the threshold (numbers of classes), and more colours.
+//! Everything else is an error: grey that stays below the threshold (class numbers), and more colours.
 
 use super::files::in_file;
 use super::image::{Wanted, decode_any, transparency};
@@ -16,10 +16,10 @@ use image::DynamicImage;
 use std::path::Path;
 use vg_geometry::{Error, Result};
 
-/// Channels of one grey differ by less in a JPEG.
+/// Difference of channels from which a colour is not grey; JPEG compression causes smaller ones.
 const GREY_SPREAD: u8 = 16;
 
-/// The mask in a PNG, a JPEG or a NumPy file; `path` is for messages only.
+/// Decodes the mask in a PNG, a JPEG or a NumPy file; `path` is for messages only.
 pub(super) fn decode(bytes: &[u8], path: &Path, wanted: Option<Wanted>) -> Result<Mask> {
     if npy::is_npy(bytes) {
         let (width, height, values) = npy::decode_mask(bytes, path)?;
@@ -50,10 +50,10 @@ fn brightness(decoded: DynamicImage, path: &Path) -> Result<Vec<u8>> {
         other => other,
     };
     let two = match &decoded {
-        DynamicImage::ImageLuma8(p) => beside_black(p.as_chunks::<1>().0),
-        DynamicImage::ImageLuma16(p) => beside_black(p.as_chunks::<1>().0),
-        DynamicImage::ImageRgb8(p) => beside_black(p.as_chunks::<3>().0),
-        DynamicImage::ImageRgb16(p) => beside_black(p.as_chunks::<3>().0),
+        DynamicImage::ImageLuma8(p) => only_color_besides_black(p.as_chunks::<1>().0),
+        DynamicImage::ImageLuma16(p) => only_color_besides_black(p.as_chunks::<1>().0),
+        DynamicImage::ImageRgb8(p) => only_color_besides_black(p.as_chunks::<3>().0),
+        DynamicImage::ImageRgb16(p) => only_color_besides_black(p.as_chunks::<3>().0),
         _ => None,
     };
     if let Some(values) = two {
@@ -72,8 +72,10 @@ fn brightness(decoded: DynamicImage, path: &Path) -> Result<Vec<u8>> {
     Ok(decoded.into_luma8().into_raw())
 }
 
-/// 255 where a pixel has the one colour that there is beside black; `None` where there are more, or no black.
-fn beside_black<T: Copy + Default + PartialEq, const N: usize>(pixels: &[[T; N]]) -> Option<Vec<u8>> {
+/// 255 for pixels of the only colour other than black, 0 for black ones; `None` if there are more colours, or no black.
+fn only_color_besides_black<T: Copy + Default + PartialEq, const N: usize>(
+    pixels: &[[T; N]],
+) -> Option<Vec<u8>> {
     let black = [T::default(); N];
     let other = *pixels.iter().find(|p| **p != black)?;
     let mut has_black = false;
@@ -91,7 +93,7 @@ mod tests {
     use image::{ImageBuffer, ImageFormat, Luma, Pixel, Rgb};
     use std::io::Cursor;
 
-    /// Vehicle pixels of a mask of two rows of four that is written as a PNG, or why it has none.
+    /// The number of vehicle pixels of a mask of two rows of four that is written as a PNG, or the error.
     fn read<P: Pixel>(pixels: [P; 8]) -> std::result::Result<usize, String>
     where
         DynamicImage: From<ImageBuffer<P, Vec<P::Subpixel>>>,
@@ -128,11 +130,11 @@ mod tests {
     }
 
     #[test]
-    fn more_greys_are_split_at_the_threshold_and_one_may_be_all_there_is() {
+    fn several_greys_are_split_at_the_threshold_and_a_single_one_is_allowed() {
         assert_eq!(grey([0, 10, 127, 128, 129, 200, 254, 255]), Ok(5));
         assert_eq!(grey([50, 50, 50, 50, 200, 200, 200, 200]), Ok(4));
         assert_eq!(deep([0, 1, 300, 25_000, 40_000, 60_000, 65_534, 65_535]), Ok(4));
-        // JPEG leaves a tint.
+        // JPEG compression tints grey.
         assert_eq!(
             colour([[0; 3], [3, 0, 5], [250, 255, 249], [255; 3], [0; 3], [0; 3], [0; 3], [1; 3]]),
             Ok(2)
@@ -143,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn what_can_be_read_in_two_ways_is_refused_and_says_how_masks_are_read() {
+    fn ambiguous_masks_are_refused_with_the_allowed_formats() {
         let classes = grey([0, 1, 2, 3, 0, 0, 0, 0]).unwrap_err();
         assert!(classes.starts_with("m.png: mask: largest value 3; allowed: 0 and 255"), "{classes}");
         assert!(grey([38; 8]).is_err());

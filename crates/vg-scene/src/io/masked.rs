@@ -1,4 +1,4 @@
-//! A scene's masks without its pictures, in the scene's own world: what alignment needs.
+//! A scene's masks without its pictures, in the scene's own world: the input of alignment.
 
 use super::files::is_there;
 use super::image::{ExifPixels, Wanted};
@@ -15,19 +15,19 @@ use vg_geometry::{Error, Result};
 /// Masked views and sparse points in the world of the scene's poses.
 #[derive(Clone, Debug)]
 pub struct MaskedViews {
-    /// Sorted by name. Cameras carry `world_from_camera`; pictures are black.
+    /// Views sorted by name. Cameras carry `world_from_camera`; pictures are black.
     pub views: Vec<View>,
-    /// Of a COLMAP model; empty where there are none.
+    /// Sparse points of a COLMAP model; empty if there are none.
     pub points: Vec<DVec3>,
-    /// How many views have no mask and were left out.
+    /// The number of views without a mask, which were left out.
     pub unmasked: usize,
-    /// What was chosen among several, and what was looked for in vain, a sentence each.
+    /// Notes on choices among several candidates and on masks that were not found, a sentence each.
     pub notes: Vec<String>,
 }
 
 /// Reads cameras, masks (files, else the pictures' alpha) and sparse points of the scene at `path`. Views without a
-/// mask are left out. Of a folder with both, the COLMAP model is read and not the `transforms.json`: it is the one whose
-/// world says nothing.
+/// mask are left out. In a folder with both, the COLMAP model is read instead of the `transforms.json`, because it is
+/// the one in an arbitrary world.
 pub fn read_masked(path: &Path) -> Result<MaskedViews> {
     let mut listing = listing::list(path, colmap_format(path))?;
     listing.views.sort_by(|a, b| a.name.cmp(&b.name));
@@ -40,7 +40,7 @@ pub fn read_masked(path: &Path) -> Result<MaskedViews> {
     let mut notes = listing.notes;
     if let Some(first) = all.iter().position(Option::is_none) {
         let ListedView { name, mask_names, .. } = &listing.views[first];
-        notes.push(format!("{name}: no mask: looked for {mask_names}"));
+        notes.push(format!("{name}: no mask; searched for {mask_names}"));
     }
     let views: Vec<View> = all.into_iter().flatten().collect();
     let points = match &listing.sparse_model {
@@ -51,7 +51,7 @@ pub fn read_masked(path: &Path) -> Result<MaskedViews> {
     Ok(MaskedViews { unmasked: listing.views.len() - views.len(), views, points, notes })
 }
 
-/// [`SceneFormat::Colmap`] where a COLMAP model is at or below `path`.
+/// [`SceneFormat::Colmap`] if a COLMAP model is at or below `path`.
 pub fn colmap_format(path: &Path) -> Option<SceneFormat> {
     listing::find_colmap(path).map(|_| SceneFormat::Colmap)
 }
@@ -64,7 +64,7 @@ fn read_view(listed: &ListedView, exif: ExifPixels) -> Result<Option<View>> {
         None if !is_there(&listed.image) => return Ok(None),
         None => {
             let Some(alpha) = image::read_wanted(&listed.image, wanted)?.alpha else { return Ok(None) };
-            image::mask_of_alpha(&listed.image, size.0, size.1, &alpha)?
+            image::mask_from_alpha(&listed.image, size.0, size.1, &alpha)?
         }
     };
     View::without_picture(listed.name.clone(), listed.camera, Some(mask)).map(Some)

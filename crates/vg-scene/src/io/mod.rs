@@ -1,7 +1,7 @@
 //! Files in and out: scenes (`transforms.json`, COLMAP), pictures, masks, depth maps, Gaussians as PLY.
 //!
-//! Every reader checks what a file claims before it allocates by it, and names file and field in its errors.
-//! Parsers work on bytes and touch no file system, so that they can be fuzzed. Writers replace a file only once
+//! Every reader checks the sizes in a file before it allocates memory for them, and names file and field in its errors.
+//! Parsers work on bytes without the file system, so that they can be fuzzed. Writers replace a file only once
 //! the new one is complete.
 
 mod beside;

@@ -1,16 +1,16 @@
-//! NumPy's `.npy`, versions 1 to 3, as far as depth maps and masks need it: one array in C order, of little-endian
+//! The subset of NumPy's `.npy`, versions 1 to 3, for depth maps and masks: one array in C order, of little-endian
 //! floats or integers, or of booleans.
 
 use super::depth::checked_size;
 use std::path::Path;
 use vg_geometry::{Error, Result};
 
-/// Depths as a file holds them.
+/// The depths of a file.
 #[derive(Debug)]
 pub(super) struct Depths {
     pub(super) width: u32,
     pub(super) height: u32,
-    /// In row order.
+    /// Values in row order.
     pub(super) values: Vec<f32>,
     /// Whether the file holds integers.
     pub(super) is_integer: bool,
@@ -20,7 +20,7 @@ const FLOATS: [(&str, usize); 2] = [("<f4", 4), ("<f8", 8)];
 const INTEGERS: [(&str, usize); 6] = [("<u2", 2), ("<i2", 2), ("<u4", 4), ("<i4", 4), ("<u8", 8), ("<i8", 8)];
 const BYTES: [(&str, usize); 3] = [("|b1", 1), ("|u1", 1), ("|i1", 1)];
 
-/// The values of a `[height][width]` array; axes of length one around it are dropped.
+/// Decodes the values of a `[height][width]` array; outer axes of length one are dropped.
 pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<Depths> {
     let array = array(bytes, path, &[&FLOATS[..], &INTEGERS].concat())?;
     let is_integer = !FLOATS.iter().any(|float| float.0 == array.kind);
@@ -28,7 +28,7 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<Depths> {
     Ok(Depths { width: array.width, height: array.height, values, is_integer })
 }
 
-/// The same of a mask: integers as they are, 255 for true.
+/// Decodes a mask: integers unchanged, 255 for true.
 pub(super) fn decode_mask(bytes: &[u8], path: &Path) -> Result<(u32, u32, Vec<u8>)> {
     let array = array(bytes, path, &[&BYTES[..], &INTEGERS].concat())?;
     if array.kind == "|b1" {
@@ -42,7 +42,7 @@ pub(super) fn decode_mask(bytes: &[u8], path: &Path) -> Result<(u32, u32, Vec<u8
     Ok((array.width, array.height, array.values().map(|v| v as u8).collect()))
 }
 
-/// Whether these are the first bytes of such a file.
+/// Whether these are the first bytes of a `.npy` file.
 pub(super) fn is_npy(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
 }
@@ -53,13 +53,13 @@ struct Array<'a> {
     width: u32,
     height: u32,
     kind: &'static str,
-    /// Bytes of a number.
+    /// Size of a number, bytes.
     item: usize,
     data: &'a [u8],
 }
 
 impl<'a> Array<'a> {
-    /// The numbers in row order; integers of 64 bits to 53.
+    /// The numbers in row order; integers of 64 bits are rounded to 53.
     fn values(&self) -> impl Iterator<Item = f64> + use<'a> {
         let number = match self.kind {
             "<f4" => |b: &[u8]| f64::from(f32::from_le_bytes(b.try_into().unwrap_or_default())),
@@ -77,11 +77,11 @@ impl<'a> Array<'a> {
     }
 }
 
-/// An array whose items are of one of `kinds`, each with its size in bytes.
+/// Parses an array whose items are of one of `kinds`, each with its size in bytes.
 fn array<'a>(bytes: &'a [u8], path: &Path, kinds: &[(&'static str, usize)]) -> Result<Array<'a>> {
     let error = |field: &str, reason: String| Error::format(path, field, reason);
     let (header, data) = split(bytes)
-        .ok_or_else(|| error("header", "not a whole .npy header; allowed: versions 1 to 3".into()))?;
+        .ok_or_else(|| error("header", "not a complete .npy header; allowed: versions 1 to 3".into()))?;
     let missing = |key: &str| error(key, format!("missing in {header:?}"));
 
     let descr = value_of(header, "descr").ok_or_else(|| missing("descr"))?.trim_matches(['\'', '"', ' ']);
@@ -119,7 +119,7 @@ fn array<'a>(bytes: &'a [u8], path: &Path, kinds: &[(&'static str, usize)]) -> R
     Ok(Array { width, height, kind, item, data })
 }
 
-/// Header text and data.
+/// Splits a file into header text and data.
 fn split(bytes: &[u8]) -> Option<(&str, &[u8])> {
     let rest = bytes.strip_prefix(MAGIC)?;
     let (version, rest) = rest.split_at_checked(2)?;
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn masks_are_booleans_or_integers_of_a_byte_s_range() {
+    fn masks_are_booleans_or_integers_from_0_to_255() {
         let header = |descr| format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (1, 3), }}");
         let decode = |descr, data: &[u8]| decode_mask(&file(1, &header(descr), data), Path::new("m.npy"));
         assert_eq!(decode("|b1", &[0, 1, 200]).unwrap(), (3, 1, vec![0, 255, 255]));
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn integers_of_any_width_are_the_same_depths_and_told_from_floats() {
+    fn integers_of_any_width_give_equal_depths_and_are_distinguished_from_floats() {
         let header = |descr| format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (1, 2), }}");
         let numbers: [(&str, Vec<u8>); 4] = [
             ("<u2", [7u16, 1234].iter().flat_map(|v| v.to_le_bytes()).collect()),

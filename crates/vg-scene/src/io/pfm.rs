@@ -4,8 +4,8 @@ use super::depth::checked_size;
 use std::path::Path;
 use vg_geometry::{Error, Result};
 
-/// Width, height and values in row order from the top. The header's scale gives the byte order by its sign; its
-/// size is a display hint that writers set at will, and is not applied.
+/// Decodes width, height and values in row order from the top. The sign of the header's scale is the byte order; its
+/// magnitude is a display hint that writers set arbitrarily, and is not applied.
 pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<(u32, u32, Vec<f32>)> {
     let error = |field: &str, reason: String| Error::format(path, field, reason);
     let mut rest = bytes;
@@ -13,7 +13,7 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<(u32, u32, Vec<f32>)> 
         rest = rest.trim_ascii_start();
         let end = rest.iter().position(u8::is_ascii_whitespace)?;
         let text = std::str::from_utf8(&rest[..end]).ok()?;
-        // One white-space byte ends the header; the data may begin with what looks like another.
+        // Exactly one white-space byte ends the header; the data may begin with a byte that looks like another.
         rest = &rest[end + 1..];
         Some(text)
     };

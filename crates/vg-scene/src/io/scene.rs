@@ -1,4 +1,4 @@
-//! Opens a scene on disk: first a listing of names, cameras and files, then the pixels of the views asked for.
+//! Opens a scene on disk: first a listing of names, cameras and files, then the pixels of the selected views.
 
 use super::files::in_file;
 use super::image::ExifPixels;
@@ -14,24 +14,24 @@ use vg_geometry::{Error, Result};
 
 pub use super::listing::DepthFile;
 
-/// What of a scene is wanted, and what its files do not say.
+/// Selection of a scene's views, and information that its files lack.
 #[derive(Clone, Debug)]
 pub struct SceneOptions {
-    /// The views, in this order, each by path, file name, or file name without extension; `None` means all.
+    /// Views to open, in this order, each by path, file name, or file name without extension; `None` means all.
     pub views: Option<Vec<String>>,
-    /// Takes the world of the poses to the vehicle's frame. A COLMAP model needs one; a `transforms.json` is
-    /// taken to be in the vehicle's frame without.
+    /// Similarity from the world of the poses to the vehicle's frame. A COLMAP model needs one; without it, a
+    /// `transforms.json` is assumed to be in the vehicle's frame.
     pub vehicle_from_world: Option<Similarity>,
-    /// Metres per number in the depth files, instead of what the scene says. Where neither says, integers are
+    /// Metres per number in the depth files, which overrides the scene's unit. Without either, integers are
     /// millimetres and floats metres.
     pub depth_scale: Option<f64>,
-    /// Whether depth files are read where there are any.
+    /// Whether existing depth files are read.
     pub load_depth: bool,
-    /// The one kind of scene to look for; `None` means a `transforms.json` before a COLMAP model.
+    /// The only format to search for; `None` means a `transforms.json`, or else a COLMAP model.
     pub format: Option<SceneFormat>,
 }
 
-/// How a scene's cameras are written.
+/// File format of a scene's cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SceneFormat {
     /// nerfstudio's `transforms.json`.
@@ -46,17 +46,17 @@ impl Default for SceneOptions {
     }
 }
 
-/// A scene's views before their pixels are read. Pictures need not exist, unless the scene file leaves their
-/// size to them.
+/// A scene's views before their pixels are read. Pictures need not exist, unless the scene file omits their
+/// size.
 #[derive(Clone, Debug)]
 pub struct SceneIndex {
     /// The `transforms.json` or the COLMAP model's folder.
     pub source: PathBuf,
-    /// In the order asked for; else as in the `transforms.json`, or by name.
+    /// Views in the order of the selection; else in the order of the `transforms.json`, or by name.
     pub views: Vec<SceneView>,
-    /// The vehicle's box in its own frame, where the scene file tells it.
+    /// The vehicle's box in its own frame, if the scene file contains it.
     pub vehicle_box: Option<VehicleBox>,
-    /// What was chosen among several, a sentence each.
+    /// Notes on choices among several candidates, a sentence each.
     pub notes: Vec<String>,
     sparse_model: Option<PathBuf>,
     vehicle_from_world: Option<Similarity>,
@@ -67,35 +67,35 @@ pub struct SceneIndex {
 pub struct SceneView {
     /// The picture's path below its images folder.
     pub name: String,
-    /// Posed in the vehicle's frame.
+    /// Camera with its pose in the vehicle's frame.
     pub camera: Camera,
     /// The picture.
     pub image: PathBuf,
-    /// The mask, where there is a file for it.
+    /// The mask's file, if it exists.
     pub mask: Option<PathBuf>,
-    /// The depth map, where there is a file for it.
+    /// The depth map's file, if it exists.
     pub depth: Option<DepthFile>,
     /// All names that were tried for the mask, for messages.
     pub(super) mask_names: String,
 }
 
-/// A camera and what it is called.
+/// A camera and its name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedCamera {
     /// The picture's path below its images folder.
     pub name: String,
-    /// Posed in the vehicle's frame.
+    /// Camera with its pose in the vehicle's frame.
     pub camera: Camera,
 }
 
 /// A scene with its pixels.
 #[derive(Clone, Debug)]
 pub struct SceneFiles {
-    /// Where each view came from.
+    /// The source of each view.
     pub index: SceneIndex,
     /// The views, in the order of the index.
     pub scene: Scene,
-    /// What is legal but looks like a mistake, one sentence each.
+    /// Notes on legal input that looks like a mistake, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -136,12 +136,12 @@ pub fn list_scene(path: &Path, options: &SceneOptions) -> Result<SceneIndex> {
     Ok(SceneIndex { source, views, vehicle_box, notes, sparse_model, vehicle_from_world })
 }
 
-/// Lists the scene at `path` and reads the pictures, masks and depth maps of the views asked for.
+/// Lists the scene at `path` and reads the pictures, masks and depth maps of the selected views.
 pub fn open_scene(path: &Path, options: &SceneOptions) -> Result<SceneFiles> {
     list_scene(path, options)?.load()
 }
 
-/// As [`open_scene`], under `watch`, which is told of every view and looked at before the next.
+/// [`open_scene`] under `watch`, which reports progress after every view and can stop before the next.
 pub fn open_scene_watched(path: &Path, options: &SceneOptions, watch: &Watch) -> Result<SceneFiles> {
     list_scene(path, options)?.load_watched(watch)
 }
@@ -152,7 +152,7 @@ impl SceneIndex {
         self.views.iter().map(|v| NamedCamera { name: v.name.clone(), camera: v.camera }).collect()
     }
 
-    /// The sparse points of a COLMAP model, moved to the vehicle's frame, metres; `None` where there are none.
+    /// The sparse points of a COLMAP model, transformed to the vehicle's frame, metres; `None` if there are none.
     /// They include ground and surroundings.
     pub fn sparse_points(&self) -> Result<Option<ColoredPoints>> {
         let Some(model) = &self.sparse_model else { return Ok(None) };
@@ -176,7 +176,7 @@ impl SceneIndex {
         Ok(SceneFiles { index: self, scene, notes })
     }
 
-    /// How its pictures were read when their cameras were found.
+    /// The pixel order to which the cameras refer.
     fn exif(&self) -> ExifPixels {
         if self.sparse_model.is_some() { ExifPixels::Stored } else { ExifPixels::BySize }
     }

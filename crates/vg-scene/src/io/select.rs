@@ -1,19 +1,19 @@
-//! Which views of a scene are meant by names.
+//! Selection of a scene's views by name.
 
 use super::listing::ListedView;
 use std::path::Path;
 use vg_geometry::{Error, Result};
 
-/// How many names an error lists.
+/// Maximum of names that an error lists.
 const SHOWN: usize = 8;
 
-/// Indices into `views` of `names`, in the order asked. A name is a view's path in the scene file, its name, its
-/// file name, or that without extension; the first of these that any view answers to must be answered by one.
+/// Indices into `views` of `names`, in their order. A name is a view's path in the scene file, its name, its
+/// file name, or that without extension; the first of these levels with a match must have exactly one.
 pub(super) fn select(views: &[ListedView], names: &[String]) -> Result<Vec<usize>> {
     names.iter().enumerate().map(|(i, name)| one(views, name, i)).collect()
 }
 
-/// Index of the view that answers to `name`.
+/// Index of the view that `name` matches.
 fn one(views: &[ListedView], name: &str, position: usize) -> Result<usize> {
     let file_name = |path: &str| Path::new(path).file_name().map(|f| f.to_string_lossy().into_owned());
     let stem = |path: &str| Path::new(path).with_extension("").to_string_lossy().into_owned();
@@ -33,8 +33,8 @@ fn one(views: &[ListedView], name: &str, position: usize) -> Result<usize> {
                 let (first, second) = (&views[first].path_in_file, &views[second].path_in_file);
                 return Err(Error::argument(
                     argument(),
-                    format!("{name:?} is {first:?} and {second:?}"),
-                    "a name of one view; give its path",
+                    format!("{name:?}, which matches {first:?} and {second:?}"),
+                    "the name of exactly one view; give its path",
                 ));
             }
             _ => {}
@@ -45,5 +45,5 @@ fn one(views: &[ListedView], name: &str, position: usize) -> Result<usize> {
     if views.len() > SHOWN {
         available.push(&more);
     }
-    Err(Error::argument(argument(), format!("{name:?}, which is no view"), available.join(", ")))
+    Err(Error::argument(argument(), format!("{name:?}, which matches no view"), available.join(", ")))
 }

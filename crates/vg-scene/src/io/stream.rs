@@ -1,7 +1,7 @@
-//! Opens what is read from front to back: a file, or a pipe, whose length nobody knows before its end.
+//! Opens inputs that are read from start to end: a file, or a pipe, whose length is unknown before its end.
 //!
-//! A pipe that has a writer is waited for as long as it takes, as any program does. One that nobody has opened for writing
-//! within [`WRITER_WAIT`] is an error: without that, a forgotten FIFO would hang its reader for ever.
+//! Reading a pipe with a writer blocks as long as necessary, as in any program. A pipe that no program opens for
+//! writing within [`WRITER_WAIT`] is an error: otherwise a forgotten FIFO would block its reader for ever.
 
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read};
@@ -9,13 +9,13 @@ use std::path::Path;
 use std::time::Duration;
 use vg_geometry::{Error, Result};
 
-/// How long a pipe may be without a writer.
+/// Maximum time that a pipe may have no writer.
 const WRITER_WAIT: Duration = Duration::from_secs(10);
 
 /// A file or a pipe, from its first byte.
 pub(super) struct Stream {
     pub(super) input: BufReader<std::io::Chain<Cursor<Vec<u8>>, File>>,
-    /// Bytes, of a file.
+    /// Length of a file, bytes; `None` for a pipe.
     pub(super) length: Option<u64>,
 }
 
@@ -38,7 +38,7 @@ fn open_within(wait: Duration, path: &Path) -> Result<Stream> {
     Ok(Stream { input: BufReader::with_capacity(1 << 16, Cursor::new(begun).chain(file)), length })
 }
 
-/// A FIFO is opened whether it has a writer or not.
+/// Opens a FIFO whether it has a writer or not.
 #[cfg(unix)]
 fn open_without_waiting(path: &Path) -> std::io::Result<File> {
     use std::os::unix::fs::OpenOptionsExt;
@@ -46,7 +46,7 @@ fn open_without_waiting(path: &Path) -> std::io::Result<File> {
     File::options().read(true).custom_flags(flags as i32).open(path)
 }
 
-/// Waits for a writer; returns what it has written so far, if that had to be read to tell.
+/// Waits for a writer; returns the bytes that had to be read to detect it.
 #[cfg(unix)]
 fn begin_pipe(mut file: &File, path: &Path, wait: Duration) -> Result<Vec<u8>> {
     use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -59,14 +59,14 @@ fn begin_pipe(mut file: &File, path: &Path, wait: Duration) -> Result<Vec<u8>> {
     let time = Timespec::try_from(wait).map_err(|e| io(std::io::Error::other(e)))?;
     let mut begun = Vec::new();
     let mut fds = [PollFd::new(&file, PollFlags::IN)];
-    // Nothing came for a while: from a writer that is at work, or from none.
+    // After a timeout, the writer is either still at work or does not exist.
     let ready = rustix::io::retry_on_intr(|| poll(&mut fds, Some(&time))).map_err(|e| io(e.into()))?;
     if ready == 0 {
         let mut byte = [0];
         match file.read(&mut byte) {
             Ok(0) => {
                 let reason = format!(
-                    "a pipe that no program has opened for writing for {} s; start the one that writes first",
+                    "a pipe that no program has opened for writing for {} s; start the writing program first",
                     wait.as_secs_f64()
                 );
                 return Err(Error::format(path, "file", reason));
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pipe_that_nobody_writes_to_is_an_error_and_no_hang() {
+    fn a_pipe_without_a_writer_is_an_error_and_does_not_block() {
         let folder = tempfile::tempdir().unwrap();
         let begun = Instant::now();
         let error = open_within(SHORT, &fifo(folder.path())).map(drop).unwrap_err().to_string();
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn a_writer_that_takes_its_time_is_waited_for() {
+    fn a_slow_writer_is_waited_for() {
         let folder = tempfile::tempdir().unwrap();
         let path = fifo(folder.path());
         let writer = std::thread::spawn({

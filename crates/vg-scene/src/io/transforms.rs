@@ -1,8 +1,8 @@
 //! nerfstudio's `transforms.json`, and instant-ngp's: intrinsics shared or per frame, camera-to-world poses with
-//! OpenGL axes, and the files of each frame. Nothing here touches the file system.
+//! OpenGL axes, and the files of each frame. This module does not access the file system.
 //!
-//! Keys that change what a picture or a pose means are honoured or refused. Those that tell a trainer how to go about
-//! it (`aabb_scale`, `scale`, `offset`, `train_filenames`, `sharpness`, ...) change nothing: poses are as written.
+//! Keys that change the meaning of a picture or a pose are supported or refused. Keys for a trainer (`aabb_scale`,
+//! `scale`, `offset`, `train_filenames`, `sharpness`, ...) are ignored: poses are used as written.
 
 use super::files::{in_file, relative_inside};
 use crate::{Place, VehicleBox};
@@ -15,19 +15,19 @@ use vg_geometry::frame::pose_from_opengl;
 use vg_geometry::{Camera, CameraModel, Distortion, Intrinsics, Pose};
 use vg_geometry::{Error, Result};
 
-/// What the file says.
+/// Content of a `transforms.json`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transforms {
-    /// In the file's order; at least one.
+    /// Frames in the file's order; at least one.
     pub frames: Vec<Frame>,
     /// `depth_unit_scale_factor` or `integer_depth_scale`: metres per number in a depth file.
     pub depth_unit: Option<f64>,
-    /// Whether depth is wanted: not with `enable_depth_loading` false.
+    /// Whether depth is loaded: `enable_depth_loading`, true by default.
     pub loads_depth: bool,
-    /// The key that says that the poses were moved from where they were measured, or that z is not up, if one does.
+    /// The key that shows that the poses were transformed or that z is not up, if any.
     pub moved_by: Option<&'static str>,
-    /// `vehicle_box`: `{"size": [length, width, height]}`, or with `"center": [x, y, z], "yaw": radians` in the world of
-    /// the poses.
+    /// `vehicle_box`: `{"size": [length, width, height]}`, or with `"center": [x, y, z], "yaw": radians` in the world
+    /// of the poses.
     pub vehicle_box: Option<VehicleBox>,
 }
 
@@ -36,19 +36,19 @@ pub struct Transforms {
 pub struct Frame {
     /// `file_path`, relative to the file's folder and inside it.
     pub file_path: PathBuf,
-    /// `mask_path`, likewise.
+    /// `mask_path`, relative to the file's folder and inside it.
     pub mask_path: Option<PathBuf>,
-    /// `depth_file_path` or `depth_path`, likewise.
+    /// `depth_file_path` or `depth_path`, relative to the file's folder and inside it.
     pub depth_file_path: Option<PathBuf>,
-    /// `world_from_camera` with our camera axes.
+    /// `world_from_camera` with this library's camera axes.
     pub world_from_camera: Pose,
-    /// `w`, `h`; without them the picture's own size counts.
+    /// `w`, `h`; without them the picture's own size is used.
     pub size: Option<(u32, u32)>,
     lens: Lens,
 }
 
-/// Hands the keys of a camera on, each of which may stand in the frame or, for all frames, at the top; then those that
-/// cannot be honoured.
+/// Calls a macro with the keys of a camera, each of which may be in the frame or, for all frames, at the top level, and
+/// with the keys that are refused.
 macro_rules! with_keys {
     ($then:ident! $($rest:tt)*) => {
         $then! {
@@ -75,7 +75,7 @@ macro_rules! lens {
             camera_model: Option<String>,
         }
         impl Lens {
-            /// These keys; those that are missing from `shared`.
+            /// These keys, with missing ones filled from `shared`.
             fn or(self, shared: Self) -> Self {
                 Self {
                     $($key: self.$key.or(shared.$key),)*
@@ -86,8 +86,8 @@ macro_rules! lens {
     };
 }
 
-/// Declares a part of the document that may hold camera keys beside its own: serde's `flatten` would do, but it
-/// copies every unknown key and loses where an error is.
+/// Declares a part of the document that may contain camera keys in addition to its own. serde's `flatten` would copy
+/// every unknown key and lose the place of errors.
 macro_rules! with_lens {
     (
         struct $name:ident { $($(#[$meta:meta])* $field:ident: $type:ty,)* }
@@ -103,7 +103,7 @@ macro_rules! with_lens {
             $($refused: Option<Value>,)*
         }
         impl $name {
-            /// The camera keys that stand here.
+            /// The camera keys of this part.
             fn lens(&self) -> std::result::Result<Lens, (&'static str, String)> {
                 let refused = [$((stringify!($refused), &self.$refused),)*];
                 let is_set = |value: &Option<Value>| value.as_ref().is_some_and(is_set);
@@ -144,7 +144,7 @@ with_keys! { with_lens!
     }
 }
 
-/// Whether a value switches its key on.
+/// Whether a value enables its key.
 fn is_set(value: &Value) -> bool {
     match value {
         Value::Null | Value::Bool(false) => false,
@@ -156,13 +156,13 @@ fn is_set(value: &Value) -> bool {
 fn why_refused(key: &str) -> &'static str {
     match key {
         "transform_matrix_start" | "transform_matrix_end" => {
-            "a camera that moves during the exposure is not understood; allowed: transform_matrix alone"
+            "a camera that moves during the exposure is not supported; allowed: transform_matrix alone"
         }
         "white_transparent" | "black_transparent" => {
-            "a colour instead of a mask is not understood; allowed: mask_path, a folder masks, or an alpha channel"
+            "a colour instead of a mask is not supported; allowed: mask_path, a folder masks, or an alpha channel"
         }
         _ => {
-            "this lens is not understood; allowed: camera_model with its coefficients. Undistort the pictures first"
+            "this lens is not supported; allowed: camera_model with its coefficients. Undistort the pictures first"
         }
     }
 }
@@ -183,7 +183,7 @@ impl BoxJson {
             (Some(center), yaw) => Some(Place { center, yaw: yaw.unwrap_or(0.0) }),
             (None, None) => None,
             (None, Some(_)) => {
-                let reason = "missing beside a yaw; allowed: x, y, z of the box's centre, metres";
+                let reason = "missing although yaw is given; allowed: x, y, z of the box's centre, metres";
                 return Err(Error::format(path, format!("{FIELD}.center"), reason));
             }
         };
@@ -276,7 +276,7 @@ impl DocumentJson {
 
     fn moved_by(&self) -> Option<&'static str> {
         const IDENTITY: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
-        /// Cosine of the angle between what the file calls up and z, some 8 degrees.
+        /// Cosine of the largest angle between the file's up axis and z, about 8 degrees.
         const UPRIGHT: f64 = 0.99;
         let is_up = |up: [f64; 3]| up[2] >= UPRIGHT * up.iter().map(|v| v * v).sum::<f64>().sqrt();
         let keys = [
@@ -313,7 +313,7 @@ fn frame(json: &FrameJson, shared: &Lens, path: &Path, field: &str) -> Result<Fr
             return Err(Error::format(
                 path,
                 format!("{field}.w, h"),
-                "only one of them; allowed: both or none",
+                "only one of them is given; allowed: both or none",
             ));
         }
     };
@@ -335,13 +335,13 @@ fn frame(json: &FrameJson, shared: &Lens, path: &Path, field: &str) -> Result<Fr
         size,
         lens,
     };
-    // What is wrong with the lens is wrong whatever the picture's size.
+    // Check the lens; its validity does not depend on the picture's size.
     frame.camera(frame.size.unwrap_or((1, 1)), path, field)?;
     Ok(frame)
 }
 
 impl Frame {
-    /// The camera of a picture of this size, its pose being `world_from_camera`; `field` names the frame.
+    /// The camera of a picture of this size, with the pose `world_from_camera`; `field` names the frame.
     pub fn camera(&self, (width, height): (u32, u32), path: &Path, field: &str) -> Result<Camera> {
         let lens = &self.lens;
         let (w, h) = (f64::from(width), f64::from(height));
@@ -374,7 +374,7 @@ impl Frame {
 }
 
 impl Lens {
-    /// instant-ngp says with a switch what nerfstudio says with a name.
+    /// Applies instant-ngp's switch, which corresponds to a camera model's name in nerfstudio.
     fn with_fisheye(mut self, is_fisheye: Option<bool>) -> std::result::Result<Self, (&'static str, String)> {
         let Some(is_fisheye) = is_fisheye else { return Ok(self) };
         let [fisheye, brown] = [CameraModel::OpenCvFisheye, CameraModel::OpenCv].map(CameraModel::name);
@@ -389,7 +389,7 @@ impl Lens {
         Ok(self)
     }
 
-    /// nerfstudio's list of all coefficients.
+    /// Applies nerfstudio's list of all coefficients.
     fn with_distortion_params(
         mut self,
         params: Option<&[f64]>,
@@ -401,14 +401,17 @@ impl Lens {
         };
         let single = [self.k1, self.k2, self.k3, self.k4, self.k5, self.k6, self.p1, self.p2];
         if single.iter().any(Option::is_some) {
-            return Err((key, "beside k1 and others; allowed: the list or the single coefficients".into()));
+            return Err((
+                key,
+                "given together with k1 or others; allowed: the list or the single coefficients".into(),
+            ));
         }
         [self.k1, self.k2, self.k3, self.k4] = [k1, k2, k3, k4].map(Some);
         [self.p1, self.p2] = [p1, p2].map(Some);
         Ok(self)
     }
 
-    /// A frame's own keys over the shared ones. A focal length wins in whichever form it is given.
+    /// A frame's own keys, completed by the shared ones. Its own focal length, in any form, replaces the shared one.
     fn over(self, shared: &Self) -> Self {
         let mut shared = shared.clone();
         if self.fl_x.or(self.camera_angle_x).or(self.x_fov).is_some() {
@@ -420,7 +423,8 @@ impl Lens {
         self.or(shared)
     }
 
-    /// nerfstudio's k1, k2, k3, p1, p2 are Brown's; with OPENCV_FISHEYE k1 to k4 are the fisheye's.
+    /// Distortion of the lens: nerfstudio's k1, k2, k3, p1, p2 are Brown's; with OPENCV_FISHEYE k1 to k4 are the
+    /// fisheye's.
     fn distortion(&self, path: &Path, field: &str) -> Result<Distortion> {
         let k = [self.k1, self.k2, self.k3, self.k4, self.k5, self.k6].map(|v| v.unwrap_or(0.0));
         let p = [self.p1, self.p2].map(|v| v.unwrap_or(0.0));
@@ -514,7 +518,7 @@ mod tests {
     }
 
     #[test]
-    fn both_ways_to_name_a_fisheye_and_to_list_its_coefficients_are_one_camera() {
+    fn all_notations_of_a_fisheye_and_its_coefficients_give_the_same_camera() {
         let fisheye = Distortion::Fisheye { k: [0.1, 0.2, 0.3, 0.4] };
         let single = r#""fl_x": 9, "k1": 0.1, "k2": 0.2, "k3": 0.3, "k4": 0.4,"#;
         let list = r#""distortion_params": [0.1, 0.2, 0.3, 0.4, 0, 0],"#;
@@ -534,7 +538,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_with_a_meaning_that_is_not_understood_are_refused_by_name() {
+    fn unsupported_keys_are_refused_by_name() {
         for (top, frame, field) in [
             (r#""is_fisheye": true, "camera_model": "OPENCV","#, "", "transforms.json: is_fisheye"),
             (r#""is_fisheye": false, "camera_model": "OPENCV_FISHEYE","#, "", "transforms.json: is_fisheye"),
@@ -542,7 +546,7 @@ mod tests {
             (
                 r#""distortion_params": [0,0,0,0,0,0], "k1": 0,"#,
                 "",
-                "transforms.json: distortion_params: beside",
+                "transforms.json: distortion_params: given together",
             ),
             (r#""ftheta_p0": 1.5,"#, "", "transforms.json: ftheta_p0"),
             ("", r#""equirectangular": true,"#, "frames[0].equirectangular"),
@@ -561,7 +565,7 @@ mod tests {
     }
 
     #[test]
-    fn instant_ngp_s_names_of_depth_are_understood() {
+    fn instant_ngp_s_depth_keys_are_supported() {
         let file = one(r#""fl_x": 1, "integer_depth_scale": 0.01,"#, r#""depth_path": "d\\a.png","#).unwrap();
         assert_eq!((file.depth_unit, file.loads_depth), (Some(0.01), true));
         assert_eq!(file.frames[0].depth_file_path.as_deref(), Some(Path::new("d/a.png")));

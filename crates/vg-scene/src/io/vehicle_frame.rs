@@ -1,5 +1,4 @@
-//! The similarity that takes a scene's own world to the vehicle's frame: as a JSON file, and from camera centres
-//! that somebody measured.
+//! The similarity from a scene's own world to the vehicle's frame: as a JSON file, and from measured camera centres.
 
 use super::files::{in_file, read_limited_or_piped, write_atomically};
 use super::{json, listing, select};
@@ -9,7 +8,7 @@ use std::path::Path;
 use vg_geometry::{Error, Result};
 use vg_geometry::{RobustFit, Similarity};
 
-/// Longest file of either kind.
+/// Maximum size of a file, bytes.
 const MAX_FILE: u64 = 4 << 20;
 
 /// Reads `{"vehicle_from_world": M}` or bare `M`, where M is a row-major 4x4 matrix as four rows or 16 numbers.
@@ -17,7 +16,7 @@ pub fn read_vehicle_from_world(path: &Path) -> Result<Similarity> {
     parse_vehicle_from_world(&read_limited_or_piped(path, MAX_FILE)?, path)
 }
 
-/// The same from bytes; `path` is for messages only.
+/// Parses the file of [`read_vehicle_from_world`] from bytes; `path` is for messages only.
 pub fn parse_vehicle_from_world(bytes: &[u8], path: &Path) -> Result<Similarity> {
     const FIELD: &str = "vehicle_from_world";
     let error = |reason: &str| Error::format(path, FIELD, reason);
@@ -44,12 +43,13 @@ pub fn parse_vehicle_from_world(bytes: &[u8], path: &Path) -> Result<Similarity>
     Similarity::from_row_major(FIELD, &matrix).map_err(|e| in_file(path, e))
 }
 
-/// Reads the same, or a plain text of 16 numbers, row-major, with blanks or commas between.
+/// Reads the file of [`read_vehicle_from_world`], or plain text of 16 numbers, row-major, with blanks or commas
+/// between.
 pub fn read_matrix(path: &Path) -> Result<Similarity> {
     parse_matrix(&read_limited_or_piped(path, MAX_FILE)?, path)
 }
 
-/// The same from bytes; `path` is for messages only.
+/// Parses the file of [`read_matrix`] from bytes; `path` is for messages only.
 pub fn parse_matrix(bytes: &[u8], path: &Path) -> Result<Similarity> {
     if matches!(bytes.trim_ascii_start().first(), Some(b'{' | b'[' | 0xef)) {
         return parse_vehicle_from_world(bytes, path);
@@ -62,7 +62,7 @@ pub fn parse_matrix(bytes: &[u8], path: &Path) -> Result<Similarity> {
         let shown: String = word.chars().take(20).collect();
         word.parse::<f64>().map_err(|_| error(format!("{shown:?}; allowed: 16 numbers")))
     };
-    // One more than allowed is enough to know that there are too many.
+    // One more than allowed is enough to detect too many.
     let numbers: Vec<f64> = words.take(17).map(number).collect::<Result<_>>()?;
     let found = numbers.len();
     let matrix: [f64; 16] = numbers.try_into().map_err(|_| {
@@ -72,12 +72,12 @@ pub fn parse_matrix(bytes: &[u8], path: &Path) -> Result<Similarity> {
     Similarity::from_row_major("matrix", &matrix).map_err(|e| in_file(path, e))
 }
 
-/// How well a similarity fits what it was found from.
+/// Quality of a similarity's fit to its input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitQuality {
-    /// Typical distance of what should coincide, metres.
+    /// Typical distance of points that should coincide, metres.
     pub residual_m: f64,
-    /// 0 to 1.
+    /// Confidence, 0 to 1.
     pub confidence: f64,
 }
 
@@ -86,7 +86,8 @@ pub fn write_vehicle_from_world(path: &Path, vehicle_from_world: &Similarity) ->
     write_alignment(path, vehicle_from_world, None)
 }
 
-/// The same with how well it fits, which readers pass over; `null` where nobody measured it.
+/// Writes the file of [`write_vehicle_from_world`] with the quality of the fit, which readers ignore; `null` if it was
+/// not measured.
 pub fn write_alignment(
     path: &Path,
     vehicle_from_world: &Similarity,
@@ -96,7 +97,7 @@ pub fn write_alignment(
     write_atomically(path, |out| out.write_all(text.as_bytes()))
 }
 
-/// The text of that file.
+/// The text of the file that [`write_alignment`] writes.
 pub fn alignment_text(vehicle_from_world: &Similarity, quality: Option<FitQuality>) -> Result<String> {
     let m = vehicle_from_world.to_row_major();
     if !m.iter().all(|v| v.is_finite()) {
@@ -122,14 +123,14 @@ pub fn read_known_centers(path: &Path) -> Result<Vec<(String, DVec3)>> {
     parse_known_centers(&read_limited_or_piped(path, MAX_FILE)?, path)
 }
 
-/// The same from bytes; `path` is for messages only.
+/// Parses the file of [`read_known_centers`] from bytes; `path` is for messages only.
 pub fn parse_known_centers(bytes: &[u8], path: &Path) -> Result<Vec<(String, DVec3)>> {
     let centers: std::collections::BTreeMap<String, [f64; 3]> = json::parse(bytes, path)?;
     Ok(centers.into_iter().map(|(name, center)| (name, DVec3::from_array(center))).collect())
 }
 
-/// The similarity that best takes the camera centres of the scene at `path` to known ones; wrong ones are left out
-/// ([`Similarity::umeyama_robust`]). Cameras are known by name as in [`super::SceneOptions::views`]; at least three, not
+/// The similarity that best takes the camera centres of the scene at `path` to known ones; outliers are left out
+/// ([`Similarity::umeyama_robust`]). Cameras are named as in [`super::SceneOptions::views`]; at least three, not
 /// on one line.
 pub fn vehicle_from_known_centers(path: &Path, known: &[(String, DVec3)]) -> Result<RobustFit> {
     let listing = listing::list(path, super::colmap_format(path))?;
@@ -145,7 +146,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nested_rows_and_flat_numbers_and_bare_matrices_read_alike_and_survive_writing() {
+    fn nested_rows_flat_numbers_and_bare_matrices_are_equal_and_survive_writing() {
         let rows = "[[0,-2,0,1.5],[2,0,0,-1],[0,0,2,0.25],[0,0,0,1]]";
         let flat = "[0,-2,0,1.5, 2,0,0,-1, 0,0,2,0.25, 0,0,0,1]";
         let texts = [

@@ -1,15 +1,15 @@
-//! The writes under way in this process, for a program that has to end in the middle of one.
+//! The active writes of this process, for a program that must end during one.
 //!
-//! The library leaves signals to its program. A handler sets the stop flag and, where the idle flag says that no
-//! temporary file exists, ends the process at once. Otherwise the writes under way fail, remove their temporary files,
-//! and the program ends on their error. There is no moment between the two: a write tells that it is under way before it
-//! looks at the stop flag, and looks at it again after it told that it is done.
+//! The library leaves signals to its program. A handler sets the stop flag and, if the idle flag is set (no temporary
+//! file exists), ends the process at once. Otherwise the active writes fail, remove their temporary files, and the
+//! program ends on their error. There is no race between the two: a write clears the idle flag before it reads the stop
+//! flag, and reads the stop flag again after it has restored the idle flag.
 
 use std::io::{self, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
-/// Count of the temporary files that exist, and the two flags.
+/// The number of active writes, and the two flags.
 #[derive(Debug)]
 pub struct Writes {
     stop: Arc<AtomicBool>,
@@ -33,17 +33,17 @@ impl Writes {
         }
     }
 
-    /// Flag that a program sets, once and for all, when it has to end: writes under way fail, and none begins.
+    /// Flag that a program sets, permanently, when it must end: active writes fail, and none begins.
     pub fn stop_flag(&self) -> Arc<AtomicBool> {
         self.stop.clone()
     }
 
-    /// Flag that is set while no temporary file exists. It is not to be changed.
+    /// Flag that is set while no temporary file exists. Callers must not change it.
     pub fn idle_flag(&self) -> Arc<AtomicBool> {
         self.idle.clone()
     }
 
-    /// Runs `work`, which may make temporary files and must remove them when a write to `Stoppable` fails.
+    /// Runs `work`, which may create temporary files and must remove them if a write to `Stoppable` fails.
     pub(super) fn run<T>(&self, work: impl FnOnce() -> io::Result<T>) -> io::Result<T> {
         self.count(1);
         // A guard, because `work` may panic.
@@ -59,7 +59,7 @@ impl Writes {
     }
 
     fn check(&self) -> io::Result<()> {
-        // Not the kind `Interrupted`, which `write_all` would try again.
+        // Not the kind `Interrupted`, after which `write_all` would retry.
         if self.stop.load(Ordering::SeqCst) { Err(io::Error::other("interrupted")) } else { Ok(()) }
     }
 
@@ -100,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn after_a_stop_writes_under_way_fail_and_none_begins() {
+    fn after_a_stop_active_writes_fail_and_none_begins() {
         let writes = Writes::new();
         let (stop, idle) = (writes.stop_flag(), writes.idle_flag());
         let mut bytes = Vec::new();
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn writes_that_overlap_are_idle_after_the_last() {
+    fn overlapping_writes_are_idle_after_the_last() {
         let writes = Writes::new();
         let idle = writes.idle_flag();
         let inner = || writes.run(|| Ok(()));

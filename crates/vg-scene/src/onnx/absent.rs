@@ -4,7 +4,7 @@ use super::{Input, ModelOptions, Ports, Tensor};
 use std::path::Path;
 use vg_geometry::Result;
 
-/// Cannot be made.
+/// A session that cannot exist.
 pub(super) enum Session {}
 
 impl Session {

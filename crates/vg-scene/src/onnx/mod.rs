@@ -1,4 +1,4 @@
-//! One way to open and run an ONNX model. What its numbers mean is the business of those who run it.
+//! Opening and running of ONNX models. The callers define the meaning of inputs and outputs.
 //!
 //! ONNX Runtime is a shared library that is loaded when the first model is opened, see [`ModelOptions::runtime`].
 //! Without the feature `onnx` every model is refused with [`Error::NotBuilt`].
@@ -22,32 +22,32 @@ use std::sync::{Arc, Mutex, PoisonError};
 use vg_geometry::threads::OfProcess;
 use vg_geometry::{Error, Result};
 
-/// Where a model runs.
+/// Execution provider of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Provider {
-    /// The processor.
+    /// The CPU.
     #[default]
     Cpu,
-    /// The first CUDA device, where the runtime was built for it.
+    /// The first CUDA device, if the runtime was built for CUDA.
     Cuda,
 }
 
-/// How a model is opened.
+/// Options for opening a model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ModelOptions {
-    /// ONNX Runtime, the library or its folder. `None`: what the environment variable `VG_ONNXRUNTIME` names, else
-    /// the one inside an installed Python package `onnxruntime`. A process has one: the first that was loaded.
+    /// ONNX Runtime, the library or its folder. `None`: the one named by the environment variable `VG_ONNXRUNTIME`, or
+    /// else the one in an installed Python package `onnxruntime`. A process uses the first one that it loads.
     pub runtime: Option<PathBuf>,
-    /// Where the model runs.
+    /// Execution provider.
     pub provider: Provider,
-    /// Whether the processor may step in where the provider cannot be had; else that is an error.
+    /// Whether the model runs on the CPU if the provider is not available; otherwise that is an error.
     pub fall_back: bool,
-    /// Threads of the runtime's own, held as long as the model is open; 0 means one per core.
+    /// Threads of the runtime, which exist as long as the model is open; 0 means one per core.
     pub threads: usize,
-    /// Whether weights are rearranged for speed when the model is opened, which can take as much memory again.
-    /// `None`: where the files take less than 1 GiB.
+    /// Whether weights are rearranged for speed when the model is opened, which can double the memory.
+    /// `None`: if the files take less than 1 GiB.
     pub prepack: Option<bool>,
-    /// Whether the runtime keeps the memory of a run for the next one.
+    /// Whether the runtime reuses the memory of a run for the next one.
     pub arena: bool,
 }
 
@@ -64,11 +64,11 @@ impl Default for ModelOptions {
     }
 }
 
-/// Most threads that the runtime is asked for.
+/// Maximum of threads of the runtime.
 const MAX_THREADS: usize = 1024;
 
 impl ModelOptions {
-    /// Each field in its range.
+    /// Checks that each field is in its range.
     ///
     /// # Errors
     /// [`Error::Argument`] with the field's name.
@@ -81,12 +81,12 @@ impl ModelOptions {
     }
 }
 
-/// Whether this build can open models: it was made with the feature `onnx`.
+/// Whether this build can open models, that is, has the feature `onnx`.
 pub const fn is_built() -> bool {
     cfg!(feature = "onnx")
 }
 
-/// What a build without networks answers to whoever asks for one in `argument`.
+/// The error of a build without networks if `argument` needs one.
 pub fn not_built(argument: &str) -> Error {
     Error::NotBuilt {
         argument: argument.into(),
@@ -95,7 +95,7 @@ pub fn not_built(argument: &str) -> Error {
     }
 }
 
-/// An open model. Clones share it; threads take turns.
+/// An open model. Clones share it; runs from several threads are serialised.
 #[derive(Clone)]
 pub struct Model {
     inner: Arc<Inner>,
@@ -107,32 +107,32 @@ struct Inner {
     session: OfProcess<Mutex<backend::Session>>,
 }
 
-/// A tensor lent to a run.
+/// A borrowed input tensor.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a> {
-    /// Of the input it is for.
+    /// Name of the input.
     pub name: &'a str,
-    /// The product is the number of values.
+    /// Dimensions; their product is the number of values.
     pub shape: &'a [usize],
-    /// Row-major.
+    /// Values, row-major.
     pub data: &'a [f32],
 }
 
-/// A tensor that came of a run.
+/// An output tensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tensor {
-    /// The product is the number of values.
+    /// Dimensions; their product is the number of values.
     pub shape: Vec<usize>,
-    /// Row-major.
+    /// Values, row-major.
     pub data: Vec<f32>,
 }
 
 impl Model {
-    /// Opens the model in a file; weights in files beside it are found by their names.
+    /// Opens the model in a file; external weights are found by their names in the same folder.
     ///
     /// # Errors
     /// [`Error::Argument`] for options out of range, [`Error::NotBuilt`] without the feature `onnx`, [`Error::Io`]
-    /// without the file, [`Error::Missing`] without a runtime or the provider, [`Error::Format`] where the runtime
+    /// without the file, [`Error::Missing`] without a runtime or the provider, [`Error::Format`] if the runtime
     /// refuses the file.
     pub fn open(path: &Path, options: &ModelOptions) -> Result<Self> {
         options.validate()?;
@@ -141,19 +141,19 @@ impl Model {
         }
         let file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
         if !file.metadata().is_ok_and(|m| m.is_file()) {
-            return Err(Error::argument("model", format!("{}, no file", path.display()), "an ONNX file"));
+            return Err(Error::argument("model", format!("{}, not a file", path.display()), "an ONNX file"));
         }
         let (session, ports) = backend::Session::open(path, options)?;
         let session = OfProcess::new(Mutex::new(session));
         Ok(Self { inner: Arc::new(Inner { path: path.to_owned(), ports, session }) })
     }
 
-    /// The file.
+    /// Path of the model's file.
     pub fn path(&self) -> &Path {
         &self.inner.path
     }
 
-    /// What it takes, gives, and says of itself.
+    /// The model's inputs, outputs and metadata.
     pub fn ports(&self) -> &Ports {
         &self.inner.ports
     }
@@ -162,24 +162,24 @@ impl Model {
     /// `None`.
     ///
     /// # Errors
-    /// [`Error::Format`] where the runtime fails, [`Error::Argument`] in a fork of the process that opened the model.
+    /// [`Error::Format`] if the runtime fails, [`Error::Argument`] in a fork of the process that opened the model.
     pub fn run(&self, inputs: &[Input]) -> Result<Vec<Option<Tensor>>> {
         let mut session = self.inner.session.get("model")?.lock().unwrap_or_else(PoisonError::into_inner);
         session.run(inputs).map_err(|reason| self.broken("run", reason))
     }
 
-    /// Takes one of the outputs of a run: of the promised shape, all finite, or an error that names it.
+    /// Takes one output of a run; an error that names it unless it has the expected shape and is finite.
     pub fn output(&self, outputs: &mut [Option<Tensor>], at: usize, shape: &[usize]) -> Result<Vec<f32>> {
         let field = format!("output {}", self.ports().outputs[at].name);
         let Some(tensor) = outputs[at].take() else {
             return Err(self.broken(field, "not a tensor of float32"));
         };
         if tensor.shape != shape {
-            let reason = format!("shape {:?} came of a run; allowed: {shape:?}", tensor.shape);
+            let reason = format!("the network returned shape {:?}; allowed: {shape:?}", tensor.shape);
             return Err(self.broken(field, reason));
         }
         match tensor.data.iter().find(|v| !v.is_finite()) {
-            Some(value) => Err(self.broken(field, format!("{value} came of a run; allowed: finite"))),
+            Some(value) => Err(self.broken(field, format!("the network returned {value}; allowed: finite"))),
             None => Ok(tensor.data),
         }
     }
@@ -196,14 +196,14 @@ impl std::fmt::Debug for Model {
     }
 }
 
-/// The same open model.
+/// Whether both are the same open model.
 impl PartialEq for Model {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.inner, &other.inner)
     }
 }
 
-/// Its file's path.
+/// Serialises the path of the model's file.
 impl Serialize for Model {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(&self.inner.path.to_string_lossy())

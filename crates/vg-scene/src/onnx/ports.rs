@@ -1,34 +1,34 @@
-//! What a model takes, gives and says of itself, and whether that is what a contract asks for.
+//! A model's inputs, outputs and metadata, and checks against a contract.
 
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
-/// What a model takes, gives, and says of itself.
+/// A model's inputs, outputs and metadata.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ports {
-    /// In the model's order.
+    /// Inputs, in the model's order.
     pub inputs: Vec<Port>,
-    /// In the model's order.
+    /// Outputs, in the model's order.
     pub outputs: Vec<Port>,
-    /// The custom metadata.
+    /// Custom metadata.
     pub metadata: BTreeMap<String, String>,
 }
 
 /// An input or output.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Port {
-    /// Its name.
+    /// Name of the port.
     pub name: String,
-    /// `None` if it is no tensor of float32 numbers; a dimension is `None` where it is free.
+    /// Dimensions; `None` if the port is not a tensor of float32 numbers. A free dimension is `None`.
     pub dimensions: Option<Vec<Option<usize>>>,
 }
 
-/// What breaks a contract.
+/// A violation of a contract.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Broken {
-    /// `input images`, `output depth`, `metadata vg.prior`.
+    /// Name of the field: `input images`, `output depth`, `metadata vg.prior`.
     pub field: String,
-    /// What was found, and what is allowed.
+    /// The value that was found and the allowed ones.
     pub reason: String,
 }
 
@@ -43,29 +43,29 @@ type Dimensions = [Option<usize>];
 type Checked<T> = Result<T, Broken>;
 
 impl Ports {
-    /// The dimensions of an input, where it is there; as many as expected, and none that contradicts.
+    /// The dimensions of an input, if it exists; an error unless they agree with the expected ones.
     pub fn input(&self, name: &str, expected: &Dimensions) -> Checked<Option<&Dimensions>> {
         let found = self.inputs.iter().find(|p| p.name == name);
         found.map(|port| port.fitting("input", expected)).transpose()
     }
 
-    /// The index of an output, where it is there; its dimensions as for an input.
+    /// The index of an output, if it exists; an error unless its dimensions agree with the expected ones.
     pub fn output(&self, name: &str, expected: &Dimensions) -> Checked<Option<usize>> {
         let found = self.outputs.iter().position(|p| p.name == name);
         found.map(|at| self.outputs[at].fitting("output", expected).map(|_| at)).transpose()
     }
 
-    /// The same of an input that must be there.
+    /// [`Ports::input`] for an input that must exist.
     pub fn required_input(&self, name: &str, expected: &Dimensions) -> Checked<&Dimensions> {
         self.input(name, expected)?.ok_or_else(|| Broken::new(format!("input {name}"), "missing"))
     }
 
-    /// The same of an output that must be there.
+    /// [`Ports::output`] for an output that must exist.
     pub fn required_output(&self, name: &str, expected: &Dimensions) -> Checked<usize> {
         self.output(name, expected)?.ok_or_else(|| Broken::new(format!("output {name}"), "missing"))
     }
 
-    /// Nobody would feed another.
+    /// Returns an error if the model has an input that is not in `known`.
     pub fn no_inputs_but(&self, known: &[&str]) -> Checked<()> {
         match self.inputs.iter().find(|p| !known.contains(&p.name.as_str())) {
             Some(port) => {
@@ -76,13 +76,13 @@ impl Ports {
         }
     }
 
-    /// The value of a key that must be there.
+    /// The value of a metadata key that must exist.
     pub fn required(&self, key: &str) -> Checked<&str> {
         let value = self.metadata.get(key).map(String::as_str);
         value.ok_or_else(|| Broken::new(format!("metadata {key}"), "missing"))
     }
 
-    /// What stands for the value of a key, which must be there unless there is a default.
+    /// The choice named by the value of a metadata key, which must exist unless there is a default.
     pub fn one_of<T: Copy>(&self, key: &str, choices: &[(&str, T)], default: Option<T>) -> Checked<T> {
         let value = match (self.metadata.get(key), default) {
             (None, Some(default)) => return Ok(default),
@@ -95,14 +95,14 @@ impl Ports {
         })
     }
 
-    /// A number of pixels.
+    /// The value of a metadata key as a number of pixels.
     pub fn count(&self, key: &str, default: u32) -> Checked<u32> {
         let Some(value) = self.metadata.get(key) else { return Ok(default) };
         let count = u32::from_str(value).ok().filter(|n| (1..=8192).contains(n));
         count.ok_or_else(|| Broken::new(format!("metadata {key}"), format!("{value:?}; allowed: 1 to 8192")))
     }
 
-    /// Three numbers.
+    /// The value of a metadata key as three numbers.
     pub(crate) fn color(&self, key: &str, default: [f32; 3]) -> Checked<[f32; 3]> {
         let Some(value) = self.metadata.get(key) else { return Ok(default) };
         let numbers: Option<Vec<f32>> =

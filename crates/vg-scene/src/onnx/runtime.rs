@@ -1,4 +1,4 @@
-//! Finds and loads ONNX Runtime, once in a process.
+//! Finds and loads ONNX Runtime, once per process.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -6,10 +6,10 @@ use vg_geometry::{Error, Result};
 
 const VARIABLE: &str = "VG_ONNXRUNTIME";
 
-/// Where the runtime of this process is.
+/// Path of the runtime that this process has loaded.
 static LOADED: Mutex<Option<PathBuf>> = Mutex::new(None);
 
-/// Loads the runtime that the caller names, else the one the environment names, else one that Python has installed.
+/// Loads the runtime named by the caller, or else by the environment, or else the one in a Python installation.
 pub(super) fn load(asked: Option<&Path>) -> Result<()> {
     let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
     let asked = asked.map(library_in).transpose()?;
@@ -26,7 +26,7 @@ pub(super) fn load(asked: Option<&Path>) -> Result<()> {
     let path = match (asked, named()) {
         (Some(path), _) => path,
         (None, Some(named)) => library_in(Path::new(&named))?,
-        (None, None) => of_python().ok_or_else(|| missing("none found in an installed Python package"))?,
+        (None, None) => find_in_python().ok_or_else(|| missing("not found in any Python installation"))?,
     };
     let path = canonical(&path);
     let environment = ort::init_from(&path).map_err(|e| missing(&e.to_string()))?;
@@ -39,7 +39,7 @@ fn missing(found: &str) -> Error {
     let found = found.split_whitespace().collect::<Vec<_>>().join(" ");
     let oldest = ort::MINOR_VERSION;
     let remedy = format!(
-        "needed is version 1.{oldest} or newer: pip install onnxruntime, or name the library (libonnxruntime.so) with \
+        "version 1.{oldest} or newer is needed: pip install onnxruntime, or name the library (libonnxruntime.so) with \
          {VARIABLE} or in the options"
     );
     Error::Missing { what: "ONNX Runtime", found, remedy }
@@ -49,7 +49,7 @@ fn canonical(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
-/// The library itself, or the one in a folder.
+/// The library at a path, which may be the library itself or its folder.
 fn library_in(path: &Path) -> Result<PathBuf> {
     if !path.is_dir() {
         return match path.exists() {
@@ -67,8 +67,8 @@ fn is_library(name: &str) -> bool {
         || (name.starts_with("libonnxruntime.") && name.ends_with(".dylib"))
 }
 
-/// In the environment that is active, in the user's own packages, beside the `python3` that would run.
-fn of_python() -> Option<PathBuf> {
+/// Finds the library in the active environment, in the user's own packages, or next to the `python3` on the path.
+fn find_in_python() -> Option<PathBuf> {
     let folder = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     let mut prefixes: Vec<PathBuf> =
         ["VIRTUAL_ENV", "CONDA_PREFIX"].iter().filter_map(|n| folder(n)).collect();
@@ -81,10 +81,10 @@ fn of_python() -> Option<PathBuf> {
                 .extend(parents.into_iter().flatten().filter_map(|p| Some(p.parent()?.parent()?.to_owned())));
         }
     }
-    prefixes.iter().find_map(|prefix| of_prefix(prefix))
+    prefixes.iter().find_map(|prefix| find_in_prefix(prefix))
 }
 
-fn of_prefix(prefix: &Path) -> Option<PathBuf> {
+fn find_in_prefix(prefix: &Path) -> Option<PathBuf> {
     let packages = |lib: &Path| {
         ["site-packages", "dist-packages"]
             .iter()
@@ -101,7 +101,7 @@ fn of_prefix(prefix: &Path) -> Option<PathBuf> {
     versions.iter().rev().find_map(|lib| packages(lib))
 }
 
-/// The last by name of the files that are asked for.
+/// The last wanted file of a folder by name.
 fn newest(folder: &Path, is_wanted: impl Fn(&str) -> bool) -> Option<PathBuf> {
     let entries = std::fs::read_dir(folder).ok()?.flatten();
     entries.filter(|e| is_wanted(&e.file_name().to_string_lossy())).map(|e| e.path()).max()

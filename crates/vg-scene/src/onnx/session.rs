@@ -10,7 +10,7 @@ use std::path::Path;
 use vg_geometry::threads::without_signals;
 use vg_geometry::{Error, Result};
 
-/// Weights of this many bytes are not rearranged unless the caller says so.
+/// Size of weights, bytes, from which they are rearranged only at the caller's request.
 const LARGE: u64 = 1 << 30;
 
 pub(super) struct Session(ort::session::Session);
@@ -73,12 +73,12 @@ fn built(path: &Path, options: &ModelOptions) -> Result<ort::session::Session> {
     let mut builder = builder.with_execution_providers(providers).map_err(|e| Error::Missing {
         what: "CUDA",
         found: words(&ort::Error::<()>::from(e)),
-        remedy: "install onnxruntime-gpu and name its library, or run on the processor".into(),
+        remedy: "install onnxruntime-gpu and name its library, or run on the CPU".into(),
     })?;
     without_signals(|| builder.commit_from_file(path)).map_err(broken)
 }
 
-/// Of the model and of the files beside it whose names begin with its own, where exporters put large weights.
+/// Total size of the model and of the files in its folder whose names begin with its own, which hold external weights.
 fn bytes_beside(path: &Path) -> u64 {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -100,7 +100,7 @@ fn port(outlet: &Outlet) -> Port {
     Port { name: outlet.name().to_owned(), dimensions }
 }
 
-/// The runtime's words in one line.
+/// The runtime's message in one line.
 fn words<R>(error: &ort::Error<R>) -> String {
     let line = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
     line.trim_end_matches('.').to_owned()

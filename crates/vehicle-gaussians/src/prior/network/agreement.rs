@@ -1,4 +1,4 @@
-//! Whether a network's own cameras and its views agree with the caller's, and by which scales they come to do so.
+//! How well a network's cameras and views agree with the caller's, and the scales that make them agree.
 
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector, Matrix3};
@@ -9,30 +9,30 @@ use vg_scene::{DepthMap, View};
 /// The network's cameras against the caller's, in the frame of the first view.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PoseFit {
-    /// What the network's translations must be multiplied by, on the whole, to be the caller's.
+    /// Common factor from the network's translations to the caller's.
     pub scale: f64,
     /// Degrees between each camera's rotation and the caller's.
     pub rotation_degrees: Vec<f64>,
-    /// Metres between each camera's place and the caller's, after turning and scaling all of them as one.
+    /// Metres between each camera's centre and the caller's, after one rotation and scale for all of them.
     pub center_m: Vec<f64>,
 }
 
-/// How much views contradict each other's depth.
+/// How much the views contradict each other's depth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ViewFit {
-    /// By which each view's depth was multiplied.
+    /// Factor applied to each view's depth.
     pub scales: Vec<f64>,
-    /// Median of |ln(depth / depth that another view sees there)| before.
+    /// Median of |ln(depth / depth that another view sees there)| before scaling.
     pub before: f64,
-    /// And after.
+    /// The median after scaling.
     pub after: f64,
 }
 
-/// Camera centres closer than this together say nothing of scale, metres.
+/// Camera centres closer together than this do not determine a scale, metres.
 const BASELINE_M: f64 = 0.01;
 
-/// Fits `predicted` camera poses, metres as the network has them, to the `given` ones, both camera-to-reference.
-/// `None` where no two cameras are apart. Rotation by orthogonal Procrustes, scale by least squares.
+/// Fits `predicted` camera poses, in the network's metres, to the `given` ones, both camera-to-reference. Returns
+/// `None` if no two cameras are apart. Rotation by orthogonal Procrustes, scale by least squares.
 pub(super) fn fit_poses(predicted: &[Pose], given: &[Pose]) -> Option<PoseFit> {
     let centred = |poses: &[Pose]| {
         let mean = poses.iter().map(|p| p.translation).sum::<DVec3>() / poses.len() as f64;
@@ -48,7 +48,7 @@ pub(super) fn fit_poses(predicted: &[Pose], given: &[Pose]) -> Option<PoseFit> {
         from.iter().zip(&to).map(|(f, t)| matrix(*t) * matrix(*f).transpose()).sum();
     let svd = covariance.svd(true, true);
     let (u, v) = (svd.u?, svd.v_t?);
-    // Cameras on a line leave a turn about it open; a reflection it must not be.
+    // Cameras on a line leave the rotation about it undetermined; it must not become a reflection.
     let sign = (u * v).determinant().signum();
     let rotation = u * Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0, 1.0, sign)) * v;
     let turned: Vec<DVec3> = from
@@ -70,19 +70,20 @@ pub(super) fn fit_poses(predicted: &[Pose], given: &[Pose]) -> Option<PoseFit> {
     })
 }
 
-/// Pixels of a view that are compared with the others, at most about so many.
+/// Approximate maximum of pixels per view that are compared with the other views.
 const SAMPLES: usize = 4000;
 
-/// Depths that differ by more than this factor are of different things.
+/// Depths that differ by more than this factor belong to different surfaces.
 const SAME: f64 = 1.5;
 
 /// Logarithms beyond this are outliers (Huber).
 const HUBER: f64 = 0.05;
 
-/// How strongly scales are held at 1, beside one pair of pixels.
+/// Weight that holds each scale at 1, relative to one pair of pixels.
 const HELD: f64 = 1.0;
 
-/// One factor per view by which their depths agree best where two views see one place, if that betters them.
+/// One factor per view that makes the depths agree best where two views see one place; all 1 if that is no
+/// improvement. Returns `None` if no two views see the same place.
 pub(super) fn fit_views(views: &[View], depths: &[DepthMap]) -> Option<ViewFit> {
     let pairs = pairs(views, depths);
     let n = views.len();
@@ -112,13 +113,13 @@ pub(super) fn fit_views(views: &[View], depths: &[DepthMap]) -> Option<ViewFit> 
     Some(ViewFit { scales, before, after: if better { after } else { before } })
 }
 
-/// The upper one of two in the middle; `None` of nothing.
+/// Median (the upper one of an even number); `None` for an empty list.
 pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// View `to` sees, in the direction where view `from` has a surface, another depth: ln(its depth / the projected).
+/// A surface point of view `from` that view `to` sees too: `ratio` is ln(depth in `to` / projected depth).
 struct Pair {
     from: usize,
     to: usize,
@@ -131,7 +132,7 @@ fn pairs(views: &[View], depths: &[DepthMap]) -> Vec<Pair> {
         let seen: Vec<(u32, u32, f32)> = vehicle_pixels(view, depth).collect();
         let every = (seen.len() / SAMPLES).max(1);
         for (j, other) in views.iter().enumerate().filter(|(j, _)| *j != i) {
-            // From camera to camera: the frame between them may be kilometres away.
+            // Directly from camera to camera: the origin of the common frame may be kilometres away.
             let to_from = other.camera.vehicle_from_camera.inverse().after(&view.camera.vehicle_from_camera);
             for (u, v, z) in seen.iter().step_by(every) {
                 let [x, y] =
@@ -156,7 +157,7 @@ fn vehicle_pixels<'a>(view: &'a View, depth: &'a DepthMap) -> impl Iterator<Item
         .filter_map(|(u, v)| Some((u, v, depth.get(u, v)?)))
 }
 
-/// The depth of the vehicle that a view has in the direction of `place`, a point in its camera's frame.
+/// The vehicle's depth in a view in the direction of `place`, a point in its camera's frame.
 fn depth_towards(view: &View, depth: &DepthMap, place: DVec3) -> Option<f64> {
     let camera: &Camera = &view.camera;
     let [u, v] = camera.project(place)?;

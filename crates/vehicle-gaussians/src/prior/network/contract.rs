@@ -1,11 +1,11 @@
-//! What a geometry network promises: contract "geometry prior", version 1 (docs/ONNX.md), read off its ports and
-//! metadata before anything is run.
+//! The contract "geometry prior", version 1 (docs/ONNX.md), read from a network's ports and metadata before it is
+//! run.
 
 use vg_geometry::Result;
 use vg_scene::framing::{Framing, Resize};
 use vg_scene::onnx::{Broken, Model, Ports};
 
-/// What the numbers of `depth` are.
+/// Meaning of the numbers of `depth`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum DepthKind {
     /// Distance from the camera along the pixel's ray.
@@ -14,7 +14,7 @@ pub(crate) enum DepthKind {
     Z,
 }
 
-/// A network that keeps the contract, as far as can be told before it is run.
+/// The contract of a network, as far as it can be checked before the network is run.
 #[derive(Clone, Debug)]
 pub(crate) struct Contract {
     /// `vg.prior`.
@@ -28,7 +28,7 @@ pub(crate) struct Contract {
     pub(crate) outputs: Outputs,
 }
 
-/// Where the outputs are, of those that there are.
+/// Indices of the outputs; `None` for outputs that the network does not have.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Outputs {
     pub(crate) depth: usize,
@@ -40,8 +40,8 @@ pub(crate) struct Outputs {
 }
 
 impl Contract {
-    /// Reads it, or says what breaks it.
-    pub(crate) fn of(model: &Model) -> Result<Self> {
+    /// Reads the contract of a model; the error names what breaks it.
+    pub(crate) fn from_model(model: &Model) -> Result<Self> {
         Self::read(model.ports()).map_err(|broken| model.broken(broken.field, broken.reason))
     }
 
@@ -50,7 +50,7 @@ impl Contract {
         if let Some(head) = ports.metadata.get("vg.head") {
             return Err(Broken::new(
                 "metadata vg.head",
-                format!("{head:?}: a Gaussian head, no geometry prior"),
+                format!("{head:?}: a Gaussian head, not a geometry prior"),
             ));
         }
         let name = ports.required("vg.prior")?.to_owned();
@@ -76,7 +76,7 @@ impl Contract {
         };
         if !is_metric && outputs.poses.is_none() {
             let reason =
-                "missing; a prior with vg.metric=false needs it, or nothing tells how large the vehicle is";
+                "missing; a prior with vg.metric=false needs it to find out how large the vehicle is";
             return Err(Broken::new("output cam_to_ref_pred", reason));
         }
         Ok(Self { name, depth, is_metric, framing, takes_intrinsics, takes_poses, outputs })

@@ -1,9 +1,9 @@
 //! Depth from a network in an ONNX file: MapAnything, or any other that keeps the contract (docs/ONNX.md).
 //!
-//! The network's own rays and cameras are checks, not geometry: a pixel's direction is that of the caller's
-//! intrinsics and its place that of the caller's pose, so that pictures and model line up. What the network says is
-//! how far; by how much its cameras and its views disagree with the caller's and with each other is reported, and
-//! taken into its scale.
+//! The network's rays and cameras are only checked: a pixel's direction comes from the caller's intrinsics and its
+//! position from the caller's pose, so that pictures and model line up. The network contributes distance alone. The
+//! disagreement of its cameras with the caller's, and of its views with each other, is reported and corrected by
+//! scales.
 
 mod agreement;
 mod contract;
@@ -31,43 +31,43 @@ pub struct NetworkPrior {
     contract: Contract,
 }
 
-/// What a network said, and how far it agrees with the caller's cameras.
+/// The result of a network, and how well it agrees with the caller's cameras.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NetworkFit {
-    /// What the network calls itself.
+    /// The network's name, from its metadata.
     pub prior: String,
-    /// Width and height of the pictures it was shown.
+    /// Width and height of its input pictures.
     pub size: [u32; 2],
     /// Median angle between its rays and those of the intrinsics, degrees.
     pub ray_degrees: Option<f64>,
-    /// Metres per unit of its depth, as it says itself; 1 where it says nothing.
+    /// Metres per unit of its depth, from its output `scale`; 1 without one.
     pub scale: f64,
     /// Its cameras against the caller's; `None` if it gives none or no two cameras are apart.
     pub poses: Option<PoseFit>,
     /// Whether depth was multiplied by `poses.scale` as well.
     pub rescaled: bool,
-    /// Its views against each other; `None` where no two see the same place.
+    /// Its views against each other; `None` if no two see the same place.
     pub views: Option<ViewFit>,
-    /// Vehicle pixels without depth: cut off, or of which it was not sure.
+    /// Vehicle pixels without depth: outside the network's crop, or masked out by the network.
     pub without_depth: usize,
-    /// What makes the result doubtful.
+    /// Reasons to doubt the result.
     pub warnings: Vec<String>,
 }
 
-/// Rays that lean by more are of another camera, degrees.
+/// Rays that deviate by more belong to another camera, degrees.
 const MOST_RAY_DEGREES: f64 = 3.0;
 
-/// A metric network's scale is corrected if its cameras say so by more than this, natural logarithm.
+/// A metric network's scale is corrected if its cameras' scale differs by more than this, natural logarithm.
 const SCALE_NOISE: f64 = 0.05;
 
-/// Cameras that lean by more, or lie off by more of their distance, are told to the caller.
+/// Cameras that deviate by more degrees, or by a larger share of their distance, give a warning.
 const DOUBTFUL_DEGREES: f64 = 5.0;
 const DOUBTFUL_SHARE: f64 = 0.1;
 
 impl NetworkPrior {
-    /// For a model that keeps the contract; [`Error::Format`] says what breaks it.
+    /// A prior that runs `model`; [`Error::Format`] names what breaks the contract.
     pub fn new(model: Model) -> Result<Self> {
-        let contract = Contract::of(&model)?;
+        let contract = Contract::from_model(&model)?;
         Ok(Self { model, contract })
     }
 }
@@ -80,7 +80,7 @@ impl DepthPrior for NetworkPrior {
     fn estimate(&self, views: &[View], context: &Context) -> Result<Geometry> {
         if let Some(n) = self.contract.framing.views.filter(|n| *n != views.len()) {
             let allowed =
-                format!("{n}: the network of {} takes no other number", self.model.path().display());
+                format!("{n}, the fixed number of views of the network {}", self.model.path().display());
             return Err(Error::argument("views", views.len().to_string(), allowed));
         }
         let given = relative_to_first(views);
@@ -89,7 +89,7 @@ impl DepthPrior for NetworkPrior {
         let fit = |(i, view): (usize, &View)| {
             let (width, height) = (view.camera.width, view.camera.height);
             Fit::new(width, height, size, self.contract.framing.resize).ok_or_else(|| {
-                let allowed = format!("a shape nearer to the network's {} x {}", size.0, size.1);
+                let allowed = format!("an aspect ratio nearer to the network's {} x {}", size.0, size.1);
                 Error::argument(format!("{}.image", view.argument(i)), format!("{width}x{height}"), allowed)
             })
         };
@@ -101,42 +101,43 @@ impl DepthPrior for NetworkPrior {
                 .collect()
         });
         context.report("prior", 0.1)?;
-        let said = self.run(views, &fits, &given, &pictures.concat())?;
+        let prediction = self.run(views, &fits, &given, &pictures.concat())?;
         context.report("prior", 0.8)?;
 
-        let mut told = NetworkFit {
+        let mut report = NetworkFit {
             prior: self.contract.name.clone(),
             size: [size.0, size.1],
             ray_degrees: None,
-            scale: said.scale,
+            scale: prediction.scale,
             poses: None,
             rescaled: false,
             views: None,
             without_depth: 0,
             warnings: Vec::new(),
         };
-        let small: Vec<Vec<f32>> = (0..views.len()).map(|i| self.planar(&said, i, &fits[i], views)).collect();
-        told.ray_degrees = self.ray_error(&said, &fits, views)?;
-        let scale = self.scale(&said, &given, &mut told)?;
+        let small: Vec<Vec<f32>> =
+            (0..views.len()).map(|i| self.planar(&prediction, i, &fits[i], views)).collect();
+        report.ray_degrees = self.ray_error(&prediction, &fits, views)?;
+        let scale = self.scale(&prediction, &given, &mut report)?;
         let mut depths = context.parallel(|| full_size(&small, &fits, views, |_| scale))?;
-        told.views = context.parallel(|| fit_views(views, &depths));
-        if let Some(fit) = told.views.as_ref().filter(|fit| fit.after < fit.before) {
+        report.views = context.parallel(|| fit_views(views, &depths));
+        if let Some(fit) = report.views.as_ref().filter(|fit| fit.after < fit.before) {
             depths = context.parallel(|| full_size(&small, &fits, views, |i| scale * fit.scales[i]))?;
         }
-        if let Some(rank) = context.parallel(|| said.confidence_ranks()) {
+        if let Some(rank) = context.parallel(|| prediction.confidence_ranks()) {
             depths = ranked(depths, &rank, &fits, views)?;
         }
         let none = |(view, depth): (&View, &DepthMap)| {
             let vehicle = |i: usize| view.mask.as_ref().is_none_or(|m| m.labels()[i] == Label::Vehicle);
             depth.depth().iter().enumerate().filter(|(i, z)| **z <= 0.0 && vehicle(*i)).count()
         };
-        told.without_depth = views.iter().zip(&depths).map(none).sum();
-        Ok(Geometry { network: Some(told), ..Geometry::new(depths, None) })
+        report.without_depth = views.iter().zip(&depths).map(none).sum();
+        Ok(Geometry { network: Some(report), ..Geometry::new(depths, None) })
     }
 }
 
-/// Checked outputs of one run.
-struct Said {
+/// The checked outputs of one run.
+struct Prediction {
     pixels: usize,
     /// `[view][pixel]`, in the unit of the network.
     depth: Vec<f32>,
@@ -151,12 +152,12 @@ struct Said {
     poses: Option<Vec<Pose>>,
 }
 
-impl Said {
+impl Prediction {
     fn is_sure(&self, view: usize, pixel: usize) -> bool {
         self.mask.as_ref().is_none_or(|mask| mask[view * self.pixels + pixel] > 0.5)
     }
 
-    /// The share of all pixels of which the network is less sure than of each: only their order means anything.
+    /// Rank of each pixel: the share of all pixels with lower confidence. Only the order of confidences is meaningful.
     fn confidence_ranks(&self) -> Option<Vec<f32>> {
         let confidence = self.confidence.as_ref()?;
         let mut sorted = confidence.clone();
@@ -167,7 +168,7 @@ impl Said {
 }
 
 impl NetworkPrior {
-    fn run(&self, views: &[View], fits: &[Fit], given: &[Pose], pictures: &[f32]) -> Result<Said> {
+    fn run(&self, views: &[View], fits: &[Fit], given: &[Pose], pictures: &[f32]) -> Result<Prediction> {
         let n = views.len();
         let (width, height) = (fits[0].size.0 as usize, fits[0].size.1 as usize);
         let intrinsics: Vec<f32> = views
@@ -198,7 +199,7 @@ impl NetworkPrior {
         let map = [n, height, width];
         let poses = at.poses.map(|at| take(at, &[n, 4, 4])).transpose()?;
         let scale = at.scale.map(|at| take(at, &[1])).transpose()?;
-        let said = Said {
+        let prediction = Prediction {
             pixels: width * height,
             depth: take(at.depth, &map)?,
             rays: at.rays.map(|at| take(at, &[n, height, width, 3])).transpose()?,
@@ -207,8 +208,8 @@ impl NetworkPrior {
             mask: at.mask.map(|at| take(at, &map)).transpose()?,
             poses: poses.map(|numbers| self.poses(&numbers)).transpose()?,
         };
-        self.check(&said)?;
-        Ok(said)
+        self.check(&prediction)?;
+        Ok(prediction)
     }
 
     fn poses(&self, numbers: &[f32]) -> Result<Vec<Pose>> {
@@ -226,38 +227,42 @@ impl NetworkPrior {
         numbers.chunks_exact(16).enumerate().map(pose).collect()
     }
 
-    fn check(&self, said: &Said) -> Result<()> {
-        for (i, z) in said.depth.iter().enumerate() {
-            if *z <= 0.0 && said.is_sure(i / said.pixels, i % said.pixels) {
-                let reason = format!("{z} came of a run; allowed: above 0 where the mask says so");
+    fn check(&self, prediction: &Prediction) -> Result<()> {
+        for (i, z) in prediction.depth.iter().enumerate() {
+            if *z <= 0.0 && prediction.is_sure(i / prediction.pixels, i % prediction.pixels) {
+                let reason =
+                    format!("the network returned {z}; allowed: above 0 where its mask is above 0.5");
                 return Err(self.model.broken("output depth", reason));
             }
         }
-        if let Some(rays) = &said.rays {
+        if let Some(rays) = &prediction.rays {
             let length = |r: &[f32]| r.iter().map(|x| x * x).sum::<f32>().sqrt();
             if let Some(r) = rays.chunks_exact(3).find(|r| (length(r) - 1.0).abs() > 1e-3) {
-                let reason = format!("a ray of length {} came of a run; allowed: 1 +- 0.001", length(r));
+                let reason =
+                    format!("the network returned a ray of length {}; allowed: 1 +- 0.001", length(r));
                 return Err(self.model.broken("output rays", reason));
             }
         }
-        if let Some(mask) = &said.mask
+        if let Some(mask) = &prediction.mask
             && let Some(p) = mask.iter().find(|p| !(0.0..=1.0).contains(*p))
         {
-            return Err(self.model.broken("output mask", format!("{p} came of a run; allowed: 0 to 1")));
+            return Err(self
+                .model
+                .broken("output mask", format!("the network returned {p}; allowed: 0 to 1")));
         }
-        if said.scale <= 0.0 {
-            let reason = format!("{} came of a run; allowed: above 0", said.scale);
+        if prediction.scale <= 0.0 {
+            let reason = format!("the network returned {}; allowed: above 0", prediction.scale);
             return Err(self.model.broken("output scale", reason));
         }
         Ok(())
     }
 
-    /// Planar depth in units of the network, 0 where it is not sure; paper eq. `metric_point_ray` along the ray of the
-    /// caller's intrinsics.
-    fn planar(&self, said: &Said, view: usize, fit: &Fit, views: &[View]) -> Vec<f32> {
+    /// Planar depth in units of the network, 0 where its mask excludes the pixel; paper eq. `metric_point_ray` along
+    /// the ray of the caller's intrinsics.
+    fn planar(&self, prediction: &Prediction, view: usize, fit: &Fit, views: &[View]) -> Vec<f32> {
         let i = fit.intrinsics(&views[view].camera.intrinsics);
-        let depth = &said.depth[view * said.pixels..(view + 1) * said.pixels];
-        let z = |(pixel, d): (usize, &f32)| match (said.is_sure(view, pixel), self.contract.depth) {
+        let depth = &prediction.depth[view * prediction.pixels..(view + 1) * prediction.pixels];
+        let z = |(pixel, d): (usize, &f32)| match (prediction.is_sure(view, pixel), self.contract.depth) {
             (false, _) => 0.0,
             (true, DepthKind::Z) => *d,
             (true, DepthKind::AlongRay) => (f64::from(*d) / ray(&i, pixel, fit.size.0).length()) as f32,
@@ -265,15 +270,15 @@ impl NetworkPrior {
         depth.iter().enumerate().map(z).collect()
     }
 
-    /// Median angle between the network's rays and the caller's, degrees; an error where they are another camera's.
-    fn ray_error(&self, said: &Said, fits: &[Fit], views: &[View]) -> Result<Option<f64>> {
-        let Some(rays) = &said.rays else { return Ok(None) };
+    /// Median angle between the network's rays and the caller's, degrees; an error if they belong to another camera.
+    fn ray_error(&self, prediction: &Prediction, fits: &[Fit], views: &[View]) -> Result<Option<f64>> {
+        let Some(rays) = &prediction.rays else { return Ok(None) };
         const EVERY: usize = 7;
         let mut angles = Vec::new();
         for (k, (fit, view)) in fits.iter().zip(views).enumerate() {
             let i = fit.intrinsics(&view.camera.intrinsics);
-            for pixel in (0..said.pixels).step_by(EVERY).filter(|p| said.is_sure(k, *p)) {
-                let at = 3 * (k * said.pixels + pixel);
+            for pixel in (0..prediction.pixels).step_by(EVERY).filter(|p| prediction.is_sure(k, *p)) {
+                let at = 3 * (k * prediction.pixels + pixel);
                 let found = DVec3::from_array(std::array::from_fn(|c| f64::from(rays[at + c])));
                 let expected = ray(&i, pixel, fit.size.0);
                 angles.push(found.cross(expected).length().atan2(found.dot(expected)).to_degrees());
@@ -282,7 +287,7 @@ impl NetworkPrior {
         let Some(median) = median(angles) else { return Ok(None) };
         if median > MOST_RAY_DEGREES {
             let reason = format!(
-                "the network's rays lean by {median:.1} degrees from those of the intrinsics (at most \
+                "the network's rays differ from those of the intrinsics by {median:.1} degrees (at most \
                  {MOST_RAY_DEGREES}): another lens, or a picture that was cropped or scaled without its intrinsics"
             );
             return Err(Error::Reconstruction { stage: "prior", reason });
@@ -291,29 +296,30 @@ impl NetworkPrior {
     }
 
     /// Metres per unit of the network.
-    fn scale(&self, said: &Said, given: &[Pose], told: &mut NetworkFit) -> Result<f64> {
-        let metres = |pose: &Pose| Pose { translation: said.scale * pose.translation, ..*pose };
+    fn scale(&self, prediction: &Prediction, given: &[Pose], report: &mut NetworkFit) -> Result<f64> {
+        let metres = |pose: &Pose| Pose { translation: prediction.scale * pose.translation, ..*pose };
         let predicted: Option<Vec<Pose>> =
-            said.poses.as_ref().map(|poses| poses.iter().map(metres).collect());
-        told.poses = predicted.as_ref().and_then(|predicted| fit_poses(predicted, given));
-        let Some(fit) = &told.poses else {
+            prediction.poses.as_ref().map(|poses| poses.iter().map(metres).collect());
+        report.poses = predicted.as_ref().and_then(|predicted| fit_poses(predicted, given));
+        let Some(fit) = &report.poses else {
             return match self.contract.is_metric {
                 true => {
-                    told.warnings.push("no two cameras are apart: the network's own scale is taken".into());
-                    Ok(said.scale)
+                    report.warnings
+                        .push("all cameras are at one place: the network's own scale is used unchecked".into());
+                    Ok(prediction.scale)
                 }
                 false => Err(Error::Reconstruction {
                     stage: "prior",
-                    reason: "the network is not metric and no two cameras are apart: nothing tells the vehicle's size; \
-                             give views from two places, or another prior"
+                    reason: "the network is not metric and all cameras are at one place: the vehicle's size cannot be \
+                             determined; give views from two places, or another prior"
                         .into(),
                 }),
             };
         };
         if !(fit.scale > 0.0 && fit.scale.is_finite()) {
             let reason = format!(
-                "the network's cameras do not fit the poses at any scale ({:.3}): a mirrored axis, or views in another \
-                 order",
+                "the network's cameras do not fit the poses at any positive scale (best: {:.3}): a mirrored axis, or \
+                 views in another order",
                 fit.scale
             );
             return Err(Error::Reconstruction { stage: "prior", reason });
@@ -322,17 +328,17 @@ impl NetworkPrior {
         let worst = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
         let (degrees, metres) = (worst(&fit.rotation_degrees), worst(&fit.center_m));
         if degrees > DOUBTFUL_DEGREES || metres > DOUBTFUL_SHARE * distance {
-            told.warnings.push(format!(
+            report.warnings.push(format!(
                 "the network's cameras differ from the poses by up to {degrees:.1} degrees and {metres:.2} m: a mirrored \
                  axis, views in another order, or a vehicle that moved"
             ));
         }
-        told.rescaled = !self.contract.is_metric || fit.scale.ln().abs() > SCALE_NOISE;
-        Ok(said.scale * if told.rescaled { fit.scale } else { 1.0 })
+        report.rescaled = !self.contract.is_metric || fit.scale.ln().abs() > SCALE_NOISE;
+        Ok(prediction.scale * if report.rescaled { fit.scale } else { 1.0 })
     }
 }
 
-/// Camera to the first view's camera, so that a world frame kilometres away never meets f32.
+/// Poses from each camera to the first view's camera, so that a distant world origin loses no precision in f32.
 fn relative_to_first(views: &[View]) -> Vec<Pose> {
     let first = views[0].camera.vehicle_from_camera.inverse();
     let mut poses: Vec<Pose> = views.iter().map(|v| first.after(&v.camera.vehicle_from_camera)).collect();
@@ -340,7 +346,7 @@ fn relative_to_first(views: &[View]) -> Vec<Pose> {
     poses
 }
 
-/// The small maps, metres, at the photographs' pixels.
+/// Depth maps in metres at the photographs' size, from the network's small maps.
 fn full_size(
     small: &[Vec<f32>],
     fits: &[Fit],
@@ -355,7 +361,7 @@ fn full_size(
     (0..views.len()).into_par_iter().map(one).collect()
 }
 
-/// The depths with the confidence of the network's nearest pixel.
+/// The depths with the confidence rank of the network's nearest pixel.
 fn ranked(depths: Vec<DepthMap>, ranks: &[f32], fits: &[Fit], views: &[View]) -> Result<Vec<DepthMap>> {
     let pixels = ranks.len() / views.len();
     let one = |(i, depth): (usize, DepthMap)| {

@@ -1,8 +1,8 @@
-//! What the shape network sees: the hull on a coarse lattice over one half of the vehicle, and a few numbers on
+//! Input of the shape network: the hull on a coarse lattice over one half of the vehicle, and a few numbers about
 //! the views.
 //!
 //! The lattice is stretched to the vehicle's box, so that a bonnet, a roof and wheels lie at about the same nodes
-//! for all vehicles; half of it is enough, for the hull is its own mirror image.
+//! for all vehicles; one half is enough because the hull is its own mirror image.
 
 use super::super::WorkingBox;
 use crate::prior::volume::{Silhouette, inside_both};
@@ -20,10 +20,10 @@ const MARGIN: [f64; 3] = [3.0, 3.0, 3.0];
 /// Hull values are clamped to this, metres: farther from the surface only the sign matters.
 pub const HULL_CLAMP_M: f32 = 0.5;
 
-/// Numbers on the box and the views, see [`view_numbers`].
+/// The number of values that describe the box and the views, see [`view_numbers`].
 pub const VIEW_NUMBERS: usize = 11;
 
-/// A lattice in the vehicle frame; |y| starts half a step from the plane.
+/// A lattice in the vehicle frame; its first |y| is half a step from the plane of symmetry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
     /// The node with the lowest x, |y| and z, metres.
@@ -33,7 +33,7 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// Over the box.
+    /// The lattice over a box and a margin around it.
     pub fn around(working_box: &WorkingBox) -> Self {
         let size = working_box.size();
         let inner = |axis: usize, margins: f64| NODES[axis] as f64 - margins * MARGIN[axis] - 1.0;
@@ -53,11 +53,11 @@ impl Lattice {
         self.low + self.step * Vec3::new(i as f32, j as f32, k as f32)
     }
 
-    /// Trilinear value at `p` (either half) of values on the nodes; outside the nearest node's. `[16][32][96]`
+    /// Trilinear interpolation of `values` at `p` (either half), clamped to the lattice. `[16][32][96]`
     pub fn sample(&self, values: &[f32], p: Vec3) -> f32 {
         let [nx, ny, nz] = NODES;
         let last = Vec3::new((nx - 1) as f32, (ny - 1) as f32, (nz - 1) as f32);
-        // Nearer to the plane than the first node both halves hold the same value.
+        // Between the plane and the first node the value is constant.
         let g = ((Vec3::new(p.x, p.y.abs(), p.z) - self.low) / self.step).clamp(Vec3::ZERO, last);
         let (i, j, k) = ((g.x as usize).min(nx - 2), (g.y as usize).min(ny - 2), (g.z as usize).min(nz - 2));
         let f = g - Vec3::new(i as f32, j as f32, k as f32);
@@ -69,7 +69,7 @@ impl Lattice {
     }
 }
 
-/// The hull of the silhouettes and their mirrored twins on the nodes: how far inside all cones, metres, negative
+/// The hull of the silhouettes and their mirrored twins on the nodes: distance inside all cones, metres, negative
 /// outside. `[16][32][96]`
 pub fn hull_on(lattice: &Lattice, silhouettes: &[Silhouette]) -> Vec<f32> {
     let [nx, ny, nz] = NODES;
@@ -83,10 +83,10 @@ pub fn hull_on(lattice: &Lattice, silhouettes: &[Silhouette]) -> Vec<f32> {
     values
 }
 
-/// What the network should know of the box and the cameras, each about 0 to 1: size of the box, number of views,
-/// how the views spread around the vehicle, how high they look from, how far away they are.
+/// Description of the box and the cameras for the network, each value about 0 to 1: size of the box, number of views,
+/// spread of the views around the vehicle, their elevation and their distance.
 pub fn view_numbers(working_box: &WorkingBox, views: &[View]) -> [f32; VIEW_NUMBERS] {
-    /// Directions, degrees from the front, and how far one view counts as near another direction.
+    /// Directions, degrees from the front, and the angular distance at which a view still counts for a direction.
     const SECTORS_DEGREES: [f64; 5] = [0.0, 45.0, 90.0, 135.0, 180.0];
     const SECTOR_WIDTH_DEGREES: f64 = 25.0;
     let size = working_box.size();

@@ -1,12 +1,12 @@
-//! The learned prior: the hull of the silhouettes, corrected by what vehicles look like.
+//! The learned prior: the hull of the silhouettes, corrected by a network trained on vehicles.
 //!
-//! A few silhouettes at one height carve a hull that is too fat, but how fat is predictable from where on the
-//! vehicle one looks. A small network that was trained on procedural vehicles only (`network`) turns the hull on
+//! A few silhouettes at one height carve a hull that is too fat, and the excess is predictable from the place on the
+//! vehicle. A small network that was trained on procedural vehicles only (`network`) turns the hull on
 //! a coarse lattice over half the vehicle ([`lattice`]) into signed distance to the vehicle's surface, with an
-//! uncertainty. It is one surface for all views and their mirrored twins: nothing has to be fused. Where the network
-//! is unsure the surface stays nearer to the hull, and nowhere it leaves the hull. Then it moves to where the
-//! photographs agree (`prior::photo`), it yields where masks are not filled, and at last it moves to measured points,
-//! where there are some.
+//! uncertainty. This is one surface for all views and their mirrored twins, so nothing has to be fused. Where the
+//! network is uncertain the surface stays nearer to the hull, and it never leaves the hull. The surface then moves to
+//! where the photographs agree (`prior::photo`), is raised where masks are not filled, and finally moves to measured
+//! points, if there are any.
 
 pub mod lattice;
 mod network;
@@ -16,7 +16,8 @@ use super::photo::fit_photographs;
 use super::volume::extent::MIRROR_M;
 use super::volume::relax::HULL_SLACK_M;
 use super::volume::{
-    Field, KnownBox, Silhouette, denied, fill_masks, find_box, fit_cloud, inside_both, inside_known, march,
+    Field, KnownBox, Silhouette, fill_masks, find_box, fit_cloud, inside_both, inside_known, march,
+    uncovered_places,
 };
 use super::{DepthPrior, Ends, Geometry, WorkingBox};
 use glam::{DVec3, IVec3, Vec3};
@@ -27,26 +28,26 @@ use vg_geometry::Result;
 use vg_geometry::progress::Context;
 use vg_scene::{Cloud, DepthMap, View};
 
-/// Metres per unit of the network's answer.
+/// Metres per unit of the network's output.
 const UNIT_M: f32 = 0.25;
 
-/// Logarithms of the Laplace scale are clamped to these, units of [`UNIT_M`].
+/// Range to which logarithms of the Laplace scale are clamped, units of [`UNIT_M`].
 const LOG_SCALE: std::ops::RangeInclusive<f32> = -4.0..=1.0;
 
-/// An expected error that halves a pixel's confidence, metres.
+/// Expected error that halves a pixel's confidence, metres.
 const HALF_TRUSTED_M: f32 = 0.05;
 
-/// Corrections with smaller expected errors are applied in full, those with larger ones not at all, metres.
+/// Corrections are applied in full below this range of expected errors and not at all above it, metres.
 const TRUSTED_M: std::ops::Range<f32> = 0.10..0.30;
 
-/// A ray of a vehicle pixel that passes the predicted surface by farther than this, and yet meets the hull, shows
-/// something that the network does not know, metres.
-const DENIED_M: f32 = 0.12;
+/// A ray of a vehicle pixel that misses the predicted surface by more than this, although it meets the hull, shows
+/// something that the network removed wrongly, metres.
+const MISSED_M: f32 = 0.12;
 
-/// Nearer to such a place than the first no correction is applied, farther than the second all, metres.
-const GIVEN_UP_M: std::ops::Range<f32> = 0.2..0.4;
+/// Distance to such a place: no correction is applied below this range, the whole correction above it, metres.
+const REVERTED_M: std::ops::Range<f32> = 0.2..0.4;
 
-/// The predicted surface is drawn in by this much, metres: a surfel reaches about half a pixel beyond its centre.
+/// Inset of the predicted surface, metres: a surfel reaches about half a pixel beyond its centre.
 const INSET_M: f32 = 0.01;
 
 /// See the module's documentation.
@@ -54,11 +55,11 @@ const INSET_M: f32 = 0.01;
 pub struct ShapePrior {
     /// The vehicle's box, as far as the caller knows it.
     pub known_box: Option<KnownBox>,
-    /// Points measured on the vehicle, where there are some.
+    /// Points measured on the vehicle, if there are any.
     pub cloud: Option<Cloud>,
     /// Whether the surface is also moved to where the photographs agree, see `prior::photo`.
     pub photo: bool,
-    /// Grid spacing, metres, where a coarser one than the finest useful one will do.
+    /// Grid spacing, metres, if coarser than the finest useful one.
     pub voxel_m: Option<f64>,
 }
 
@@ -79,11 +80,11 @@ impl DepthPrior for ShapePrior {
         context.report("prior", 0.35)?;
         let (mut field, hull) = context.parallel(|| {
             let (field, hull) = shape.field(&working_box, &silhouettes, self.voxel_m);
-            let unknown = denied(&field, &hull, views, DENIED_M);
-            if unknown.is_empty() {
+            let removed = uncovered_places(&field, &hull, views, MISSED_M);
+            if removed.is_empty() {
                 return (field, hull);
             }
-            shape.give_up_near(&unknown);
+            shape.revert_near(&removed);
             (shape.bounded_by(&hull), hull)
         });
         context.report("prior", 0.45)?;
@@ -106,14 +107,14 @@ impl DepthPrior for ShapePrior {
     }
 }
 
-/// What the network says of half a vehicle.
+/// The network's prediction for half a vehicle.
 struct Shape {
     lattice: Lattice,
-    /// How far inside the hull, metres, clamped to the network's range. `[16][32][96]`
+    /// Distance inside the hull, metres, clamped to the network's range. `[16][32][96]`
     hull: Vec<f32>,
     /// Signed distance to the surface, positive inside, metres. `[16][32][96]`
     distance: Vec<f32>,
-    /// Mean absolute error to be expected there, metres. `[16][32][96]`
+    /// Expected mean absolute error of `distance`, metres. `[16][32][96]`
     error: Vec<f32>,
 }
 
@@ -144,8 +145,8 @@ impl Shape {
         Self { lattice, hull, distance, error }
     }
 
-    /// The depth with its confidence, `c` = 1 / (1 + e / 0.05 m) where the network expects an error of `e`, times
-    /// what the depth had.
+    /// The depth with confidence 1 / (1 + e / 0.05 m), where the network expects an error of `e`, times the depth's own
+    /// confidence.
     fn with_confidence(&self, view: &View, depth: DepthMap) -> Result<DepthMap> {
         let width = depth.width();
         let confidence = (0..depth.depth().len() as u32)
@@ -161,7 +162,7 @@ impl Shape {
         depth.with_confidence(confidence)
     }
 
-    /// On a fine grid, nowhere outside the hull, and the hull itself.
+    /// The surface as a field on a fine grid, nowhere outside the hull, and the hull itself.
     fn field(
         &self,
         working_box: &WorkingBox,
@@ -177,24 +178,24 @@ impl Shape {
         (self.bounded_by(&hull), hull)
     }
 
-    /// On the hull's grid, nowhere outside it.
+    /// The surface as a field on the hull's grid, nowhere outside the hull.
     fn bounded_by(&self, hull: &Field) -> Field {
         let mut field = hull.clone();
         field.adjust(|p, hull| (self.lattice.sample(&self.distance, p) - INSET_M).min(hull + HULL_SLACK_M));
         field
     }
 
-    /// Takes corrections back, all of them within [`GIVEN_UP_M`] of these places and their mirror images, then less
-    /// and less: the masks show something there that the network took away.
-    fn give_up_near(&mut self, places: &[Vec3]) {
+    /// Reverts corrections near these places and their mirror images, where the masks show something that the network
+    /// removed: entirely below [`REVERTED_M`], not at all above it, linearly between.
+    fn revert_near(&mut self, places: &[Vec3]) {
         let fold = |p: &Vec3| Vec3::new(p.x, p.y.abs(), p.z);
-        // Neighbouring rays tell the same.
+        // Neighbouring rays find the same place: one per cell is enough.
         let mut cells: Vec<[i32; 3]> =
-            places.iter().map(|p| (fold(p) / GIVEN_UP_M.start * 2.0).round().as_ivec3().to_array()).collect();
+            places.iter().map(|p| (fold(p) / REVERTED_M.start * 2.0).round().as_ivec3().to_array()).collect();
         cells.sort_unstable();
         cells.dedup();
         let places: Vec<Vec3> =
-            cells.iter().map(|c| IVec3::from_array(*c).as_vec3() * GIVEN_UP_M.start * 0.5).collect();
+            cells.iter().map(|c| IVec3::from_array(*c).as_vec3() * REVERTED_M.start * 0.5).collect();
         let [nx, _, nz] = NODES;
         let lattice = self.lattice;
         let rows = self.distance.par_chunks_mut(nx).zip(self.hull.par_chunks(nx)).enumerate();
@@ -203,25 +204,25 @@ impl Shape {
                 let node = lattice.node(i, row / nz, row % nz);
                 let near =
                     places.iter().map(|p| p.distance_squared(node)).fold(f32::INFINITY, f32::min).sqrt();
-                let kept = way_through(&GIVEN_UP_M, near);
+                let kept = way_through(&REVERTED_M, near);
                 *distance = hull + kept * (*distance - hull);
             }
         });
     }
 }
 
-/// The part of a correction that is applied: where the network does not know what it sees, the hull at least is
-/// what the silhouettes say.
+/// The part of a correction that is applied: where the network is uncertain, the hull at least agrees with the
+/// silhouettes.
 fn trust(error: f32) -> f32 {
     1.0 - way_through(&TRUSTED_M, error)
 }
 
-/// 0 before the range, 1 behind it, linear between.
+/// 0 below the range, 1 above it, linear between.
 fn way_through(range: &std::ops::Range<f32>, x: f32) -> f32 {
     ((x - range.start) / (range.end - range.start)).clamp(0.0, 1.0)
 }
 
-/// Channels as `training/shape/network.py` has them: hull slices along |y|, x, z, and the view numbers, constant.
+/// Channels in the order of `training/shape/network.py`: hull slices along |y|, x, z, and the constant view numbers.
 fn network_input(hull: &[f32], numbers: &[f32; VIEW_NUMBERS]) -> Planes {
     let [nx, ny, nz] = NODES;
     let mut input = Planes::new(ny + 2 + VIEW_NUMBERS, nz, nx);

@@ -1,13 +1,13 @@
-//! The shape network, evaluated: a U-Net of 3 x 3 convolutions whose channels begin and end as slices along |y|.
+//! Evaluation of the shape network: a U-Net of 3 x 3 convolutions whose input and output channels are slices along |y|.
 //!
 //! `training/shape/network.py` is its twin. Weights are float16 in the file and f32 here. Products are added in one
-//! fixed order, without fused instructions: the same bytes on every machine and with any number of threads.
+//! fixed order, without fused instructions, for the same bytes on every machine and with any number of threads.
 
 use rayon::prelude::*;
 use std::sync::OnceLock;
 use vg_geometry::{Error, Result};
 
-/// Trained on procedural vehicles; `training/README.md` tells how to make it again.
+/// Weights trained on procedural vehicles; `training/README.md` describes how to train them again.
 static WEIGHTS: &[u8] = include_bytes!("weights.bin");
 
 const MAGIC: &[u8; 8] = b"VGSHAPE1";
@@ -25,7 +25,7 @@ pub(crate) struct Network {
     layers: Vec<Layer>,
 }
 
-/// Channels of rows, with a frame of zeros one pixel wide. `[channels][height + 2][width + 2]`
+/// Planes of channels, padded with zeros one pixel wide. `[channels][height + 2][width + 2]`
 #[derive(Clone)]
 pub(crate) struct Planes {
     channels: usize,
@@ -35,28 +35,28 @@ pub(crate) struct Planes {
 }
 
 impl Planes {
-    /// Zeros.
+    /// Planes of zeros.
     pub(crate) fn new(channels: usize, height: usize, width: usize) -> Self {
         Self { channels, height, width, values: vec![0.0; channels * (height + 2) * (width + 2)] }
     }
 
-    /// Row `v` of a channel, without the frame.
+    /// Row `v` of a channel, without the padding.
     pub(crate) fn row_mut(&mut self, channel: usize, v: usize) -> &mut [f32] {
         let stride = self.width + 2;
         let start = (channel * (self.height + 2) + v + 1) * stride + 1;
         &mut self.values[start..start + self.width]
     }
 
-    /// Row `v` of a channel, without the frame.
+    /// Row `v` of a channel, without the padding.
     pub(crate) fn row(&self, channel: usize, v: usize) -> &[f32] {
         let stride = self.width + 2;
         let start = (channel * (self.height + 2) + v + 1) * stride + 1;
         &self.values[start..start + self.width]
     }
 
-    /// Twice as large, by repetition, with the channels of `beside` behind its own.
-    fn doubled_with(&self, beside: &Self) -> Self {
-        let mut out = Self::new(self.channels + beside.channels, beside.height, beside.width);
+    /// Nearest-neighbour upsampling by two, with the channels of `skip` appended.
+    fn doubled_with(&self, skip: &Self) -> Self {
+        let mut out = Self::new(self.channels + skip.channels, skip.height, skip.width);
         for channel in 0..self.channels {
             for v in 0..out.height {
                 let from = self.row(channel, v / 2);
@@ -66,13 +66,13 @@ impl Planes {
             }
         }
         let start = self.channels * (out.height + 2) * (out.width + 2);
-        out.values[start..].copy_from_slice(&beside.values);
+        out.values[start..].copy_from_slice(&skip.values);
         out
     }
 }
 
 impl Network {
-    /// The network inside the library.
+    /// The network that is compiled into the library.
     pub(crate) fn embedded() -> Result<&'static Self> {
         static NETWORK: OnceLock<Option<Network>> = OnceLock::new();
         NETWORK.get_or_init(|| Self::read(WEIGHTS)).as_ref().ok_or_else(|| Error::Reconstruction {
@@ -102,13 +102,13 @@ impl Network {
         (layers.len() == 13 && numbers.next().is_none()).then_some(Self { layers })
     }
 
-    /// Channels of the input and of the answer.
+    /// Channels of the input and of the output.
     #[cfg(test)]
     fn ends(&self) -> (usize, usize) {
         (self.layers[0].inputs, self.layers[12].outputs)
     }
 
-    /// `[inputs][32][96]` to `[outputs][32][96]`. Call inside the pool that should do the work.
+    /// Maps `[inputs][32][96]` to `[outputs][32][96]`, on the current thread pool.
     pub(crate) fn run(&self, input: &Planes) -> Planes {
         let layer = |i: usize, x: &Planes| self.layers[i].run::<1>(x, true);
         let halved = |i: usize, x: &Planes| self.layers[i].run::<2>(x, true);
@@ -126,11 +126,11 @@ impl Network {
 /// Output channels that share one pass over the input.
 const TOGETHER: usize = 4;
 
-/// Widest row; the lattice's.
+/// Width of the widest row, the lattice's.
 const MOST_COLUMNS: usize = super::lattice::NODES[0];
 
 impl Layer {
-    /// The convolution with zeros around, then max(0, x) if `rectified`.
+    /// The zero-padded convolution, followed by max(0, x) if `rectified`.
     fn run<const STRIDE: usize>(&self, x: &Planes, rectified: bool) -> Planes {
         debug_assert_eq!((x.channels, self.outputs % TOGETHER), (self.inputs, 0));
         let mut out = Planes::new(self.outputs, x.height / STRIDE, x.width / STRIDE);
@@ -193,7 +193,7 @@ impl Layer {
     }
 }
 
-/// IEEE 754 half precision; exact.
+/// Converts IEEE 754 half precision, exactly.
 fn f32_from_f16(bits: u16) -> f32 {
     let sign = u32::from(bits & 0x8000) << 16;
     let (exponent, fraction) = (u32::from(bits >> 10 & 0x1f), u32::from(bits & 0x3ff));
@@ -212,7 +212,7 @@ mod tests {
     use super::super::network_input;
     use super::*;
 
-    /// What `training/shape/parity.py` wrote: a hull as int8, view numbers, every 29th value of the answer.
+    /// Output of `training/shape/parity.py`: a hull as int8, view numbers, every 29th value of the network's output.
     static PARITY: &[u8] = include_bytes!("../../../../../tests/data/shape/parity.bin");
 
     fn parity() -> (Planes, Vec<f32>) {
@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn the_answer_is_that_of_the_network_that_was_trained() {
+    fn the_output_equals_that_of_the_trained_network() {
         let (input, expected) = parity();
         let network = Network::embedded().unwrap();
         assert_eq!(network.ends(), (input.channels, 2 * NODES[1]));
@@ -242,7 +242,7 @@ mod tests {
             largest = largest.max(expected.abs());
         }
         assert_eq!(expected.len(), flat.len().div_ceil(29));
-        // Sums of some thousand f32 products in another order.
+        // The reference sums some thousand f32 products in another order.
         assert!(worst < 1e-4 * largest && largest > 0.5, "{worst} of {largest}");
     }
 
@@ -281,6 +281,6 @@ mod tests {
         assert!(Network::read(WEIGHTS).is_some());
         assert!(Network::read(&WEIGHTS[..WEIGHTS.len() - 2]).is_none());
         assert!(Network::read(&WEIGHTS[1..]).is_none());
-        assert!(WEIGHTS.len() <= 2 << 20, "2 MB is what the library may carry");
+        assert!(WEIGHTS.len() <= 2 << 20, "the library's limit for weights is 2 MB");
     }
 }

@@ -8,26 +8,26 @@ use rayon::prelude::*;
 use vg_geometry::{Error, Result};
 use vg_scene::View;
 
-/// Road vehicles are no larger than this, metres (length of an articulated bus, width and height of a lorry
-/// with its mirrors); silhouettes that do not bound an axis stop here or at the proportions below.
+/// Size of the largest road vehicles, metres (length of an articulated bus, width and height of a lorry
+/// with its mirrors); an axis that the silhouettes do not bound ends here or at the proportions below.
 const LARGEST_M: DVec3 = DVec3::new(19.0, 3.0, 4.5);
 
-/// Wider than this part of its length a vehicle is not (a city car), unless it is short.
+/// Largest width over length of a vehicle (a city car), unless it is short.
 const WIDTH_OVER_LENGTH: f64 = 0.46;
 
-/// Every vehicle may be this wide, metres.
+/// Width that any vehicle may have, metres.
 const NARROWEST_LIMIT_M: f64 = 1.7;
 
 /// Grid points along the longest axis of the search.
 const SEARCH_POINTS: f64 = 72.0;
 
-/// Outer mirrors stand out of the body by less than this, metres.
+/// Upper bound on how far outer mirrors protrude from the body, metres.
 pub(crate) const MIRROR_M: f64 = 0.12;
 
-/// Farther outside than this nobody asks how far, metres.
+/// Beyond this distance outside, the exact value does not matter, metres.
 const FAR_OUTSIDE_M: f32 = -1.0;
 
-/// What the silhouettes leave: lowest and highest corner, metres; the vehicle lies within.
+/// Box that the silhouettes leave for the vehicle, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
     /// Lowest corner.
@@ -37,10 +37,10 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// The box of a vehicle of which nothing else is known.
+    /// The working box of a vehicle if only its silhouettes are known.
     ///
     /// # Errors
-    /// [`Error::Reconstruction`] where no road vehicle is so large.
+    /// [`Error::Reconstruction`] if no road vehicle is so large.
     pub fn estimated_box(&self) -> Result<WorkingBox> {
         let size = self.high - self.low;
         if size.cmpgt(LARGEST_M * 1.2).any() {
@@ -62,12 +62,12 @@ impl Extent {
     }
 }
 
-/// Bounds the vehicle by carving coarsely, each time in what was left before: first in a cube around where the views
-/// look. A vehicle of a known size may be as wide as that; of another one the width is what road vehicles and their wheels
-/// allow.
+/// Bounds the vehicle by repeated coarse carving, each time in the box that the last pass left, starting from a cube
+/// around the point the views look at. The width is limited to the known size, or else to the proportions of road
+/// vehicles and to the width at the wheels.
 ///
 /// # Errors
-/// [`Error::Reconstruction`] where the silhouettes meet nowhere.
+/// [`Error::Reconstruction`] if the silhouettes do not intersect.
 pub fn extent(
     views: &[View],
     known_size: Option<[f64; 3]>,
@@ -75,7 +75,7 @@ pub fn extent(
 ) -> Result<Extent> {
     let center = meeting_point(views);
     let radius = search_radius(views, center)?;
-    // Views from one end see the length foreshortened, and the point they meet at is near that end.
+    // Views from one end see the length foreshortened, and their meeting point is near that end.
     let radius = known_size.map_or(radius, |[length, ..]| radius.max(length));
     let y = known_size.map_or(radius.min(0.5 * LARGEST_M.y), |[_, width, _]| 0.5 * width);
     let mut low = DVec3::new(center.x - radius, -y, center.z - radius);
@@ -87,9 +87,10 @@ pub fn extent(
         let Some(bounds) = field.bounds_above(-0.5 * voxel as f32) else {
             return Err(Error::Reconstruction {
                 stage: "prior",
-                reason: "the silhouettes and their mirror images meet nowhere; check the poses (camera to \
+                reason:
+                    "the silhouettes and their mirror images do not intersect; check the poses (camera to \
                          vehicle, x forward, y left, z up, symmetry plane y = 0) and the masks"
-                    .into(),
+                        .into(),
             });
         };
         let margin = DVec3::splat(voxel);
@@ -110,16 +111,16 @@ pub fn extent(
     Ok(Extent { low, high })
 }
 
-/// Half the width where the vehicle stands on the ground, or `None` if nothing stands.
+/// Half the width where the vehicle stands on the ground, or `None` if no wheels are found.
 ///
 /// A few silhouettes at one height bound the flanks loosely (the hull bulges by decimetres) but the tyres
 /// tightly: cameras above the ground see the gap below the sills, so near the ground the hull ends a few
-/// centimetres beside the outer faces of the wheels. Bodies are flush with their wheels to a few centimetres;
-/// only mirrors stick out.
+/// centimetres outside the outer faces of the wheels. Bodies are flush with their wheels to a few centimetres;
+/// only mirrors protrude.
 fn half_width_at_the_wheels(low: DVec3, high: DVec3, inside: impl Fn(Vec3) -> f32 + Sync) -> Option<f64> {
     const SLICE_M: f64 = 0.02;
     const STEP_M: f64 = 0.03;
-    /// A wheel is taller than this; a bulge of the hull below the ground is not.
+    /// Minimum height of a wheel, metres; a bulge of the hull below the ground is lower.
     const WHEEL_M: f64 = 0.16;
     let slices = ((0.6 * (high.z - low.z)).min(0.8) / SLICE_M) as usize;
     let columns = ((high.x - low.x) / STEP_M) as usize;
@@ -142,15 +143,15 @@ fn half_width_at_the_wheels(low: DVec3, high: DVec3, inside: impl Fn(Vec3) -> f3
     Some(widths[ground + 2] + 0.5 * STEP_M)
 }
 
-/// About where the vehicle is and how far it reaches from there, metres, from where the views look; `None` where
-/// they look at no common place.
+/// Approximate middle and radius of the vehicle, metres, from the directions of the views; `None` if they do not look
+/// at a common place.
 pub fn whereabouts(views: &[View]) -> Option<(DVec3, f64)> {
     let center = meeting_point(views);
     search_radius(views, center).ok().map(|radius| (center, radius))
 }
 
 /// The point nearest to all central rays and their mirror images; it lies on y = 0. Views that all look along
-/// x leave the distance open: a weak pull to the origin of the vehicle frame closes it.
+/// x do not determine the distance: a weak pull to the origin of the vehicle frame does.
 fn meeting_point(views: &[View]) -> DVec3 {
     const PULL: f64 = 1e-3;
     let mut normal = DMat3::from_diagonal(DVec3::splat(PULL));
@@ -170,7 +171,7 @@ fn meeting_point(views: &[View]) -> DVec3 {
     DVec3::new(point.x, 0.0, point.z)
 }
 
-/// How far from the meeting point the vehicle can reach, metres.
+/// Largest distance of the vehicle from the meeting point, metres.
 fn search_radius(views: &[View], center: DVec3) -> Result<f64> {
     let mut radius: f64 = 0.0;
     for view in views {
@@ -193,7 +194,7 @@ fn search_radius(views: &[View], center: DVec3) -> Result<f64> {
     Ok(radius.clamp(1.0, LARGEST_M.x))
 }
 
-/// How far inside the box `p` is, metres.
+/// Distance of `p` inside the box, metres, negative outside.
 pub fn inside_box(working_box: &WorkingBox, p: Vec3) -> f32 {
     let p = p.to_array();
     (0..3)
@@ -201,8 +202,8 @@ pub fn inside_box(working_box: &WorkingBox, p: Vec3) -> f32 {
         .fold(f32::INFINITY, f32::min)
 }
 
-/// How far inside a box that the caller knows `p` is, metres; infinite inside one that was estimated, which bounds nothing
-/// that the silhouettes do not. Mirrors stand out of widths that are given without them.
+/// Distance of `p` inside a box that the caller gave, metres, negative outside; infinite for an estimated box, which
+/// adds nothing to the silhouettes. The box is widened for mirrors, since given widths may exclude them.
 pub fn inside_known(working_box: &WorkingBox, p: Vec3) -> f32 {
     match working_box.source {
         BoxSource::Estimated => f32::INFINITY,
@@ -214,7 +215,7 @@ pub fn inside_known(working_box: &WorkingBox, p: Vec3) -> f32 {
     }
 }
 
-/// All silhouettes' verdict: how far inside all cones; far outside, 1 m, some value below that.
+/// Distance of `p` inside the cones of all silhouettes, metres, negative outside; below -1 m any value below -1 m.
 pub fn inside_all(silhouettes: &[Silhouette], p: Vec3) -> f32 {
     let mut least = f32::INFINITY;
     for silhouette in silhouettes {
@@ -226,7 +227,7 @@ pub fn inside_all(silhouettes: &[Silhouette], p: Vec3) -> f32 {
     least
 }
 
-/// The verdict of all silhouettes and of their mirrored twins.
+/// Distance of `p` inside the cones of all silhouettes and of their mirrored twins, see [`inside_all`].
 pub fn inside_both(silhouettes: &[Silhouette], p: Vec3) -> f32 {
     let here = inside_all(silhouettes, p);
     if here < FAR_OUTSIDE_M {

@@ -3,10 +3,10 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Values are clamped to this, metres: beyond it only the sign matters.
+/// Limit to which values are clamped, metres: beyond it only the sign matters.
 const CLAMP_M: f32 = 1.0;
 
-/// How far inside the hull each grid point is, metres, negative outside.
+/// Distance of each grid point inside the hull, metres, negative outside.
 #[derive(Clone)]
 pub(crate) struct Field {
     low: Vec3,
@@ -84,8 +84,8 @@ impl Field {
         }
     }
 
-    /// Replaces every value by `new(point, value)`, a function that is even in y: it is asked for one half, at
-    /// y >= 0, so that what was its own mirror image remains so to the bit.
+    /// Replaces every value by `new(point, value)`, a function that is even in y. It is evaluated at y >= 0 only, so
+    /// that a field that is its own mirror image remains so to the bit.
     pub(crate) fn adjust(&mut self, new: impl Fn(Vec3, f32) -> f32 + Sync) {
         let ([nx, ny, _], low, voxel) = (self.size, self.low, self.voxel);
         self.values.par_chunks_mut(nx * ny).enumerate().for_each(|(k, slab)| {
@@ -95,7 +95,7 @@ impl Field {
                     let p = Vec3::new(p.x, p.y.abs(), p.z);
                     let (a, b) = (j * nx + i, (ny - 1 - j) * nx + i);
                     let one = new(p, slab[a]);
-                    // Values that are each other's mirror image stay so, for half the work.
+                    // Equal values on both sides stay equal, for half the work.
                     let other = if slab[b] == slab[a] { one } else { new(p, slab[b]) };
                     (slab[a], slab[b]) = (one, other);
                 }
@@ -103,7 +103,7 @@ impl Field {
         });
     }
 
-    /// x fastest. `[nz][ny][nx]`
+    /// The values, x fastest. `[nz][ny][nx]`
     #[cfg(test)]
     pub(crate) fn values(&self) -> &[f32] {
         &self.values
@@ -120,8 +120,8 @@ impl Field {
         self.voxel
     }
 
-    /// Where the zero surface begins and ends along each axis, interpolated, and the points that reach farthest there:
-    /// `[axis][low, high]`; `None` where nothing is inside.
+    /// Both ends of the zero surface along each axis, interpolated, and the grid points that reach farthest:
+    /// `[axis][low, high]`; `None` if no point is inside.
     pub(crate) fn surface_ends(&self) -> Option<[[(f32, Vec3); 2]; 3]> {
         let [nx, ny, nz] = self.size;
         let strides = [1, nx, nx * ny];
@@ -143,7 +143,7 @@ impl Field {
         let end = |axis: usize, from: usize, outward: isize| {
             let (inside, index) = slices[axis][from];
             let beyond = from.checked_add_signed(outward).and_then(|k| slices[axis].get(k));
-            // Beyond the grid there is nothing.
+            // At the border of the grid the surface ends at the grid point.
             let way = beyond.map_or(0.0, |(outside, _)| inside / (inside - outside).max(1e-6));
             let at = point(index);
             (at[axis] + outward as f32 * way * self.voxel, at)
@@ -163,7 +163,7 @@ impl Field {
         (self.low, self.low + extent)
     }
 
-    /// Trilinear value; outside the grid the nearest point's.
+    /// Trilinear interpolation, clamped to the grid.
     pub(crate) fn sample(&self, p: Vec3) -> f32 {
         let [nx, ny, nz] = self.size;
         let g = ((p - self.low) / self.voxel)

@@ -1,9 +1,9 @@
 //! A box whose size is known, placed where the silhouettes allow it.
 //!
-//! A tracked box knows its size to centimetres and its place to decimetres. The place follows from the silhouettes.
+//! The size of a tracked box is good to centimetres, its place to decimetres. The place follows from the silhouettes.
 //! The vehicle touches every tangent plane of a silhouette and every face of its box. So the box reaches every tangent
 //! plane, and its faces lie within the hull. Both conditions are linear in the box's centre (x, z): they leave a
-//! polygon of possible centres. The boxes of all of them together bound the vehicle, wherever in the polygon it is.
+//! polygon of possible centres. The union of the boxes over this polygon bounds the vehicle.
 
 use super::extent::{Extent, extent, inside_all};
 use super::silhouette::Silhouette;
@@ -15,38 +15,37 @@ use vg_scene::{Mask, VehicleBox, View};
 /// Tangents of a silhouette, evenly around it.
 const TANGENTS: usize = 48;
 
-/// The conditions give way by this at a time until a place is left, metres.
+/// Step by which the conditions are relaxed until a place is left, metres.
 const SLACK_STEP_M: f64 = 0.02;
 
-/// Masks, poses and sizes are wrong by this and more together, metres: it is added to what the conditions have to give
-/// way by.
+/// Combined error of masks, poses and sizes, metres: added to the slack that the conditions need.
 const TOLERANCE_M: f64 = 0.03;
 
-/// Conditions that have to give way by more than this doubt the size, metres: the silhouettes are then believed instead.
+/// Slack above which the size is doubtful and the silhouettes are used instead, metres.
 const DOUBTED_M: f64 = 0.1;
 
-/// Conditions that have to give way by more than this contradict the size, metres: it is that of another vehicle.
+/// Slack above which the size is an error, metres: it belongs to another vehicle.
 const CONTRADICTED_M: f64 = 0.25;
 
-/// A known box that bounds every side closer than the estimate without it by less than this tells nothing new, metres: the
-/// places that it can have differ by as much.
+/// Gain on a side below which a known box adds nothing to the estimate without it, metres: its possible places differ
+/// by as much.
 pub const TELLING_M: f64 = 0.2;
 
-/// A place that the caller gave is believed to this, metres: three standard deviations of a tracked box.
+/// Tolerance of a place that the caller gave, metres: three standard deviations of a tracked box.
 const PLACE_M: f64 = 0.3;
 
-/// What the caller knows of the vehicle's box.
+/// The vehicle's box, as far as the caller knows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KnownBox {
     /// Length, width, height, metres.
     pub size: [f64; 3],
-    /// x and z of the box's centre, metres, where known; its y is 0.
+    /// x and z of the box's centre, metres, if known; its y is 0.
     pub center: Option<[f64; 2]>,
 }
 
 impl KnownBox {
-    /// The caller's box in the frame in which the vehicle's middle plane is y = 0. `is_own_frame`: the frame is the box's
-    /// own, about its centre; otherwise that of the cameras, whose plane the box stands on.
+    /// The caller's box in the frame in which the vehicle's middle plane is y = 0. If `is_own_frame`, that is the box's
+    /// own frame, about its centre; otherwise the cameras' frame, with the box on its plane y = 0.
     pub fn in_working_frame(known: &VehicleBox, is_own_frame: bool) -> Self {
         let center = known.place.map(|place| match is_own_frame {
             true => [0.0, 0.0],
@@ -56,42 +55,41 @@ impl KnownBox {
     }
 }
 
-/// Where a box of known size can be.
+/// Possible places of a box of known size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
-    /// Lowest and highest x and z of the centre, metres.
+    /// Lowest x and z of the centre, metres.
     pub low: DVec2,
-    /// See `low`.
+    /// Highest x and z of the centre, metres.
     pub high: DVec2,
-    /// What the conditions had to give way by, metres.
+    /// Slack that the conditions needed, metres.
     pub slack_m: f64,
 }
 
-/// The box to look for the vehicle in: as the silhouettes bound it, and a box of known size, where it bounds the vehicle
-/// closer.
+/// The box to look for the vehicle in, bounded by the silhouettes and by a box of known size where that is tighter.
 ///
 /// # Errors
-/// [`Error::Reconstruction`] where the silhouettes bound no vehicle, [`Error::Argument`] where the known box fits nowhere.
+/// [`Error::Reconstruction`] if the silhouettes bound no vehicle, [`Error::Argument`] if the known box fits nowhere.
 pub fn find_box(known: Option<&KnownBox>, views: &[View], silhouettes: &[Silhouette]) -> Result<WorkingBox> {
     let inside = |p| inside_all(silhouettes, p);
     let estimated = extent(views, None, inside)?;
     let Some(known) = known else { return estimated.estimated_box() };
-    // What road vehicles are usually like says nothing of where this one stands.
+    // With a known size the usual proportions of road vehicles are not needed.
     let grown = known.size.map(|side| side + 2.0 * TOLERANCE_M);
     let carved = extent(views, Some(grown), inside)?;
     let placement = place(known, &carved, views)?;
     Ok(bounded(known, &placement, &carved, &estimated))
 }
 
-/// What the silhouettes leave, no farther out than a box of the known size reaches from any place that it can have; the box
-/// that is estimated without the size where that is nearly the same, or where the size is doubtful.
+/// The carved extent, limited to the reach of a box of the known size from all its possible places; or the box that is
+/// estimated without the size, if that is nearly the same or the size is doubtful.
 fn bounded(known: &KnownBox, placement: &Placement, carved: &Extent, estimated: &Extent) -> WorkingBox {
     let half = 0.5 * DVec3::from_array(known.size);
     let reach = half + DVec3::splat(TOLERANCE_M);
     let low = DVec3::new(placement.low.x - reach.x, -reach.y, placement.low.y - reach.z).max(carved.low);
     let high = DVec3::new(placement.high.x + reach.x, reach.y, placement.high.y + reach.z).min(carved.high);
-    // Wheels tell the body's width closer than a size does that may include mirrors. Along the other axes the estimate may
-    // have ended before the vehicle, where one end alone was seen: then it is shorter.
+    // Wheels bound the body's width more tightly than a size that may include mirrors. Along the other axes the
+    // estimate is too short if the views show only one end of the vehicle.
     let room = estimated.high - estimated.low;
     let ended = |k: usize| k != 1 && room[k] < known.size[k];
     let within = |k: usize, side: f64, estimate: f64, clamp: fn(f64, f64) -> f64| match ended(k) {
@@ -128,10 +126,10 @@ fn place(known: &KnownBox, extent: &Extent, views: &[View]) -> Result<Placement>
     let at = known.center.map_or_else(String::new, |[x, z]| format!(" around x = {x:.2} m, z = {z:.2} m"));
     Err(Error::argument(
         "options.vehicle_size",
-        format!("{length} x {width} x {height} m, which fits the silhouettes nowhere{at}"),
+        format!("{length} x {width} x {height} m, which does not fit the silhouettes anywhere{at}"),
         format!(
-            "length, width and height to {CONTRADICTED_M} m of a vehicle that the silhouettes bound by {:.1} x {:.1} x \
-             {:.1} m; leave the size out where it is not known",
+            "length, width and height, to {CONTRADICTED_M} m, of a vehicle within the silhouettes' bounds of {:.1} x \
+             {:.1} x {:.1} m; leave the size out if it is not known",
             shown.x, shown.y, shown.z
         ),
     ))
@@ -166,7 +164,7 @@ fn conditions(known: &KnownBox, extent: &Extent, views: &[View]) -> Vec<Conditio
     all
 }
 
-/// Lowest and highest corner of the polygon that the conditions leave if they give way by `slack_m`.
+/// Lowest and highest corner of the polygon that the conditions leave with a slack of `slack_m`.
 fn polygon(conditions: &[Condition], extent: &Extent, slack_m: f64) -> Option<(DVec2, DVec2)> {
     let (low, high) = (extent.low, extent.high);
     let mut corners = vec![
@@ -199,8 +197,8 @@ fn clipped(corners: &[DVec2], inside: impl Fn(DVec2) -> f64) -> Vec<DVec2> {
 }
 
 /// Planes through the camera that touch the silhouette from outside: the unit normal, which points away from the
-/// vehicle, and the camera's centre, vehicle frame. The vehicle reaches each of them also where a border or an occluder
-/// cuts the silhouette, for the ray of the outermost pixel lies in the plane.
+/// vehicle, and the camera's centre, vehicle frame. The vehicle reaches each of them even where a border or an occluder
+/// cuts the silhouette, because the ray of the outermost pixel lies in the plane.
 fn tangent_planes(view: &View) -> Vec<(DVec3, DVec3)> {
     let Some(mask) = &view.mask else { return Vec::new() };
     let rows = rows(mask);
@@ -218,7 +216,7 @@ fn tangent_planes(view: &View) -> Vec<(DVec3, DVec3)> {
     (0..TANGENTS).filter_map(plane).collect()
 }
 
-/// The rows that show the vehicle, with the first and the last column that do.
+/// The rows that show the vehicle, each with its first and last vehicle column.
 fn rows(mask: &Mask) -> Vec<(u32, u32, u32)> {
     let shows = |v: u32| {
         let first = (0..mask.width()).find(|&u| mask.is_vehicle(u, v))?;

@@ -8,16 +8,16 @@ use vg_geometry::Result;
 use vg_scene::mask::Label;
 use vg_scene::{DepthMap, View};
 
-/// Confidence of a pixel whose ray passes the hull by and was given the hull's nearest point.
+/// Confidence of a pixel whose ray misses the hull and takes the depth where it comes closest.
 const GRAZING_CONFIDENCE: f32 = 0.5;
 
-/// Where a ray meets the surface of a field; z is planar depth, metres.
+/// Result of intersecting a ray with the surface of a field; z is planar depth, metres.
 pub(super) enum Meeting {
-    /// It enters the inside here.
+    /// The ray enters the inside here.
     Surface(f32),
-    /// It passes by: where it comes closest.
+    /// The ray misses the surface and comes closest here.
     Closest { z: f32 },
-    /// It misses the grid altogether.
+    /// The ray misses the grid.
     Nowhere,
 }
 
@@ -28,13 +28,13 @@ pub(super) struct Rays {
     intrinsics: Intrinsics,
 }
 
-/// Planar depth of every vehicle pixel of `view`. A ray that misses the hull (poses or masks a little off)
+/// Planar depth of every vehicle pixel of `view`. A ray that misses the hull (poses or masks slightly wrong)
 /// takes the depth where it comes closest, so that every vehicle pixel is filled, with lower confidence.
 pub(crate) fn march(view: &View, field: &Field) -> Result<DepthMap> {
     let camera = &view.camera;
     let mask = view.mask.as_ref().expect("hull views have masks");
     let width = camera.width as usize;
-    let rays = Rays::of(view);
+    let rays = Rays::new(view);
     let mut pixels = vec![(0.0f32, 0.0f32); width * camera.height as usize];
     pixels.par_chunks_mut(width).enumerate().for_each(|(v, row)| {
         for (u, pixel) in row.iter_mut().enumerate() {
@@ -53,7 +53,7 @@ pub(crate) fn march(view: &View, field: &Field) -> Result<DepthMap> {
 }
 
 impl Rays {
-    pub(super) fn of(view: &View) -> Self {
+    pub(super) fn new(view: &View) -> Self {
         Self {
             origin: view.camera.center().as_vec3(),
             rotation: view.camera.vehicle_from_camera.rotation.as_mat3(),
@@ -76,7 +76,7 @@ impl Rays {
         meet(field, self.origin, self.direction(u, v))
     }
 
-    /// Where a pixel's ray is deepest inside the field, of the first stretch it is inside; `None` if it never is.
+    /// The deepest point of a pixel's ray on its first stretch inside the field; `None` if it is never inside.
     pub(super) fn deepest(&self, field: &Field, u: usize, v: usize) -> Option<Vec3> {
         let Meeting::Surface(first) = self.meet(field, u, v) else { return None };
         let direction = self.direction(u, v);
@@ -88,20 +88,20 @@ impl Rays {
         Some(point(deepest.map_or(0, |(k, _)| k)))
     }
 
-    /// With z = 1 in the camera frame.
+    /// Direction of a pixel's ray, with z = 1 in the camera frame.
     fn direction(&self, u: usize, v: usize) -> Vec3 {
         let [x, y] = self.intrinsics.normalized_from_pixel([u as f64 + 0.5, v as f64 + 0.5]);
         self.rotation * Vec3::new(x as f32, y as f32, 1.0)
     }
 }
 
-/// `direction` has z = 1 in the camera frame, so that z along it is planar depth.
+/// Intersects a ray with the field; `direction` has z = 1 in the camera frame, so that z along it is planar depth.
 fn meet(field: &Field, origin: Vec3, direction: Vec3) -> Meeting {
     let (low, high) = field.bounds();
     let (t0, t1) = ((low - origin) / direction, (high - origin) / direction);
     let enter = t0.min(t1).max_element().max(0.0);
     let leave = t0.max(t1).min_element();
-    // A ray in a face of the grid gives NaN; it touches nothing.
+    // A ray in a face of the grid gives NaN and counts as a miss.
     if enter.is_nan() || leave.is_nan() || enter >= leave {
         return Meeting::Nowhere;
     }
@@ -119,13 +119,13 @@ fn meet(field: &Field, origin: Vec3, direction: Vec3) -> Meeting {
             closest = (z, f);
         }
         before = z;
-        // The field falls off no faster than distance, up to the slant of a pixel off the optical axis.
+        // The field's slope is at most 1, up to the slant of a pixel off the optical axis.
         z += (-0.7 * f / metres_per_z).max(shortest);
     }
     Meeting::Closest { z: closest.0 }
 }
 
-/// Where the value crosses zero between `outside` and `inside`, by bisection to 1/64 of the step.
+/// The zero crossing of the value between `outside` and `inside`, by bisection to 1/64 of the step.
 fn refine(value: impl Fn(f32) -> f32, mut outside: f32, mut inside: f32) -> f32 {
     for _ in 0..6 {
         let middle = 0.5 * (outside + inside);

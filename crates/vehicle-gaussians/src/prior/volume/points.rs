@@ -1,47 +1,47 @@
 //! Moves a field's surface to measured points: a LiDAR sweep, or any cloud in the vehicle's frame.
 //!
-//! Points lie on the surface up to noise, but some do not: stray ones, the road, seats seen through a window.
-//! Those outside the hull of the silhouettes cannot be vehicle and are left out; those inside are outvoted by
-//! their neighbours ([`super::relax`]).
+//! Most points lie on the surface up to noise. Others are stray, or lie on the road or on seats seen through a window.
+//! Those outside the hull of the silhouettes cannot belong to the vehicle and are left out; those inside are outvoted
+//! by their neighbours ([`super::relax`]).
 
 use super::field::Field;
 use super::fill::hold_masks;
-use super::relax::{Ceiling, Pull, Relaxation, Wish, relax};
+use super::relax::{Ceiling, Pull, PullKind, Relaxation, relax};
 use glam::Vec3;
 use rayon::prelude::*;
 use serde::Serialize;
 use vg_scene::{Cloud, View};
 
-/// Farther outside the silhouettes' hull than this, a point is not the vehicle's, metres: poses and the noise of
-/// a sensor stay below.
+/// Largest distance of a vehicle point outside the silhouettes' hull, metres: errors of poses and sensor noise stay
+/// below.
 const OUTSIDE_M: f32 = 0.05;
 
-/// Points of one cell of this size, metres, count as one, so that the cost is bounded by the vehicle's surface.
+/// Size of the cells whose points count as one, metres, so that the cost is bounded by the vehicle's surface.
 const CELL_M: f32 = 0.03;
 
-/// A cell's weight grows with the root of its points up to this.
+/// Largest weight of a cell; it grows with the square root of the number of points.
 const MOST_WEIGHT: f32 = 3.0;
 
-/// On ten ray-traced vehicles, see docs/SHAPE.md.
+/// Chosen on ten ray-traced vehicles, see docs/SHAPE.md.
 const RELAXATION: Relaxation =
     Relaxation { coarsest: 0.64, finest: 0.08, pulls_per_cell: 2.0, scale: 0.03, stiffness: 0.3, fade: 0.02 };
 
-/// What became of the points.
+/// How measured points were used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PointFit {
     /// Points the surface was moved to.
     pub used: usize,
-    /// Points outside the silhouettes' hull, which the vehicle cannot reach.
+    /// Points outside the silhouettes' hull, which cannot lie on the vehicle.
     pub outside: usize,
-    /// Median distance of the used points to the surface before, metres, as far as the field can tell.
+    /// Median distance of the used points to the surface before it was moved, metres, approximated by the field's
+    /// value.
     pub before_m: f64,
-    /// And after.
+    /// The distance after it was moved.
     pub after_m: f64,
 }
 
-/// Bends `field` until its surface passes through `points`, vehicle frame, metres, all finite. `hull` says
-/// where the vehicle can be at all, where that is known better than by the field itself; `held` is what the
-/// points are not to undo.
+/// Deforms `field` until its surface passes through `points`, vehicle frame, metres, all finite. `hull` bounds the
+/// vehicle; without it the field itself does. `held` are pulls that the points must not undo.
 fn fit_points(field: &mut Field, hull: Option<&Field>, points: &[[f32; 3]], held: &[Pull]) -> PointFit {
     let bound: &Field = hull.unwrap_or(field);
     let inside: Vec<Vec3> = points
@@ -64,7 +64,7 @@ fn fit_points(field: &mut Field, hull: Option<&Field>, points: &[[f32; 3]], held
     }
 }
 
-/// The same for the scene's cloud, if there is one; the masks that `field` fills stay filled.
+/// Deforms `field` to the scene's cloud, if there is one; the masks that `field` fills stay filled.
 pub(crate) fn fit_cloud(
     field: &mut Field,
     hull: &Field,
@@ -76,7 +76,7 @@ pub(crate) fn fit_cloud(
     Some(fit_points(field, Some(hull), points, &held))
 }
 
-/// How far outside the field's grid a point is, metres.
+/// Distance of a point outside the field's grid, metres.
 fn beyond(field: &Field, p: Vec3) -> f32 {
     let (low, high) = field.bounds();
     (low - p).max(p - high).max_element().max(0.0)
@@ -86,19 +86,19 @@ fn beyond(field: &Field, p: Vec3) -> f32 {
 fn thinned(points: &[Vec3]) -> Vec<Pull> {
     let fold = |p: Vec3| Vec3::new(p.x, p.y.abs(), p.z);
     let cell = |p: Vec3| (fold(p) / CELL_M).floor().as_ivec3().to_array();
-    let mut order: Vec<([i32; 3], usize)> =
+    let mut point_by_cell: Vec<([i32; 3], usize)> =
         points.par_iter().enumerate().map(|(i, p)| (cell(*p), i)).collect();
-    order.par_sort_unstable();
+    point_by_cell.par_sort_unstable();
     let pull = |group: &[([i32; 3], usize)]| {
         let sum: glam::DVec3 = group.iter().map(|(_, i)| fold(points[*i]).as_dvec3()).sum();
         let point = (sum / group.len() as f64).as_vec3();
         let weight = (group.len() as f32).sqrt().min(MOST_WEIGHT);
-        Pull { point, target: 0.0, wish: Wish::Exactly, weight }
+        Pull { point, target: 0.0, kind: PullKind::Exact, weight }
     };
-    order.chunk_by(|a, b| a.0 == b.0).map(pull).collect()
+    point_by_cell.chunk_by(|a, b| a.0 == b.0).map(pull).collect()
 }
 
-/// Of the pulls' points to the surface, metres, as far as the field can tell.
+/// Median distance of the pulls' points to the surface, metres, approximated by the field's value.
 pub(crate) fn median_distance(field: &Field, pulls: &[Pull]) -> f64 {
     let mut distances: Vec<f32> = pulls.iter().map(|p| field.sample(p.point).abs()).collect();
     let middle = distances.len() / 2;
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn millions_of_one_point_are_one_point() {
+    fn ten_million_equal_points_act_as_one() {
         let mut field = slab();
         let fit = fit_points(&mut field, None, &vec![[0.3, -0.6, 0.2]; 10_000_000], &[]);
         assert_eq!(fit.used, 10_000_000);
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn points_that_are_all_elsewhere_change_nothing() {
+    fn points_far_from_the_vehicle_change_nothing() {
         let mut field = slab();
         let fit = fit_points(&mut field, None, &[[0.0, 9.0, 0.0]], &[]);
         assert_eq!((fit.used, fit.before_m, fit.after_m), (0, 0.0, 0.0));

@@ -1,4 +1,4 @@
-//! Bends a field smoothly until it agrees with what is known at scattered points.
+//! Deforms a field smoothly until it has given values at scattered points.
 //!
 //! Given pulls (a point, the value the field should have there), finds the correction d, trilinear on a lattice
 //! and even in y, that minimises
@@ -7,11 +7,11 @@
 //! sum_i w_i rho((t_i - F(p_i) - d(p_i)) / c) + stiffness sum_edges (d_a - d_b)^2 + fade sum_nodes d_a^2
 //! ```
 //!
-//! and adds it to the field. rho is Cauchy's, by reweighted least squares, each solved by conjugate gradients. A
-//! membrane held at a few points in space only dimples around them, so the lattice is refined from coarse to
-//! fine, every level explaining what the coarser ones left: far from the pulls the correction fades at the
-//! coarsest spacing, and detail stays where there are pulls enough to know it. Multilevel approximation of
-//! scattered data goes back to Lee, Wolberg and Shin (1997).
+//! and adds it to the field. rho is the Cauchy loss, minimised by iteratively reweighted least squares, each solved by
+//! conjugate gradients. A membrane held at a few points in space only dimples around them, so the lattice is refined
+//! from coarse to fine, and every level fits the residual of the coarser ones: far from the pulls the correction fades
+//! at the coarsest spacing, and detail remains where there are enough pulls to determine it. Multilevel approximation
+//! of scattered data goes back to Lee, Wolberg and Shin (1997).
 //!
 //! Sums run in a fixed order on one thread: the systems are small, and the result is the same on any machine.
 
@@ -19,44 +19,44 @@ use super::field::Field;
 use glam::Vec3;
 use std::collections::HashSet;
 
-/// Reweightings at each level: weights move little after the third.
+/// Reweightings at each level: weights change little after the third.
 const REWEIGHTINGS: usize = 3;
 
-/// Steps of conjugate gradients at most; coarser levels leave only short waves to each.
+/// Maximum of conjugate gradient steps; coarser levels leave only short wavelengths to each level.
 const MOST_STEPS: usize = 30;
 
 /// Residual of the normal equations at which a solve ends, relative to its start.
 const SOLVED: f64 = 1e-3;
 
-/// A level changes nodes up to this many cells from a pull: beyond, its change has faded.
+/// Distance from a pull, in cells, up to which a level changes nodes: beyond, its change has faded.
 const REACH: usize = 2;
 
-/// Nodes of a lattice at most: beyond a vehicle's size (a hostile box) the finest levels are left out.
+/// Maximum of nodes of a lattice: for boxes much larger than a vehicle (hostile input) the finest levels are left out.
 const MOST_NODES: usize = 400_000;
 
-/// What the field should be at a point.
+/// The value that the field should have at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Pull {
     /// Vehicle frame, metres; its mirror image is pulled as well.
     pub(crate) point: Vec3,
-    /// The value wanted there, metres inside.
+    /// The target value, metres inside.
     pub(crate) target: f32,
-    /// Whether more is as good.
-    pub(crate) wish: Wish,
+    /// Whether the target is exact or a lower bound.
+    pub(crate) kind: PullKind,
     /// Weight against the other pulls, about 1.
     pub(crate) weight: f32,
 }
 
-/// How a [`Pull`]'s target is meant.
+/// Meaning of a [`Pull`]'s target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Wish {
-    /// The surface is known to be here.
-    Exactly,
-    /// The vehicle is known to reach here at least.
+pub(crate) enum PullKind {
+    /// The surface is here.
+    Exact,
+    /// The vehicle reaches at least this far.
     AtLeast,
 }
 
-/// How [`relax`] weighs the pulls against smoothness.
+/// Weights and scales of [`relax`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Relaxation {
     /// Node spacing of the first level, metres, halved from level to level.
@@ -66,28 +66,28 @@ pub(crate) struct Relaxation {
     /// A level is left out, and all finer ones, where occupied cells hold fewer exact pulls than this on
     /// average.
     pub(crate) pulls_per_cell: f32,
-    /// Residuals well beyond this are taken for errors, metres. A level whose residuals are mostly larger uses
-    /// their own spread: before the first bend all pulls look wrong.
+    /// Residuals well beyond this count as outliers, metres. A level whose residuals are mostly larger uses
+    /// their own spread: before the first correction all pulls look like outliers.
     pub(crate) scale: f32,
     /// Weight of a difference between neighbouring nodes.
     pub(crate) stiffness: f64,
-    /// Weight of a correction where nothing asks for one.
+    /// Weight that holds the correction at zero.
     pub(crate) fade: f64,
 }
 
-/// A hull of silhouettes may be this much too thin, metres: masks and poses are not exact.
+/// How much too thin a hull of silhouettes can be, metres: masks and poses are not exact.
 pub(crate) const HULL_SLACK_M: f32 = 0.02;
 
-/// Values a field may not be raised above.
+/// Upper bound for raised values of a field.
 #[derive(Clone, Copy)]
 pub(crate) struct Ceiling<'a> {
-    /// What contains the vehicle.
+    /// The field that contains the vehicle.
     pub(crate) hull: &'a Field,
-    /// How far the hull itself may be wrong, metres.
+    /// Tolerance above the hull, metres.
     pub(crate) slack: f32,
 }
 
-/// Bends `field` towards `pulls`; without any, it keeps its bytes. A value above the ceiling is not raised
+/// Deforms `field` towards `pulls`; without any, the field is unchanged. A value above the ceiling is not raised
 /// further.
 pub(crate) fn relax(field: &mut Field, ceiling: Option<Ceiling>, pulls: &[Pull], how: &Relaxation) {
     let Some(correction) = solve(field, pulls, how) else { return };
@@ -100,9 +100,9 @@ pub(crate) fn relax(field: &mut Field, ceiling: Option<Ceiling>, pulls: &[Pull],
     });
 }
 
-/// The correction; `None` where there is nothing to correct.
+/// The correction; `None` if no pull is active.
 fn solve(field: &Field, pulls: &[Pull], how: &Relaxation) -> Option<Lattice> {
-    // How much each pull still lacks.
+    // Residual of each pull.
     let mut lack: Vec<f64> = pulls.iter().map(|p| f64::from(p.target - field.sample(p.point))).collect();
     if !pulls.iter().zip(&lack).any(|(pull, lack)| pull.is_active(*lack)) {
         return None;
@@ -115,7 +115,7 @@ fn solve(field: &Field, pulls: &[Pull], how: &Relaxation) -> Option<Lattice> {
         let mesh = Mesh::around(&mut rows, correction.size);
         let change = level(&mesh, &rows, pulls, &lack, how);
         for (row, lack) in rows.iter().zip(&mut lack) {
-            *lack -= row.of(&change);
+            *lack -= row.interpolate(&change);
         }
         mesh.nodes.iter().zip(&change).for_each(|(node, change)| correction.values[*node as usize] += change);
         spacing *= 0.5;
@@ -130,16 +130,17 @@ fn solve(field: &Field, pulls: &[Pull], how: &Relaxation) -> Option<Lattice> {
 
 impl Pull {
     fn is_active(&self, lack: f64) -> bool {
-        self.wish == Wish::Exactly || lack > 0.0
+        self.kind == PullKind::Exact || lack > 0.0
     }
 }
 
-/// The change of the mesh's values that explains `lack` best.
+/// The change of the mesh's values that fits the residuals `lack` best.
 fn level(mesh: &Mesh, rows: &[Row], pulls: &[Pull], lack: &[f64], how: &Relaxation) -> Vec<f64> {
     let mut change = vec![0.0; mesh.nodes.len()];
     let mut weights = vec![0.0; rows.len()];
     for _ in 0..REWEIGHTINGS {
-        let left: Vec<f64> = rows.iter().zip(lack).map(|(row, lack)| lack - row.of(&change)).collect();
+        let left: Vec<f64> =
+            rows.iter().zip(lack).map(|(row, lack)| lack - row.interpolate(&change)).collect();
         let scale = f64::from(how.scale).max(spread(pulls, &left));
         for ((weight, pull), left) in weights.iter_mut().zip(pulls).zip(&left) {
             *weight = match pull.is_active(*left) {
@@ -152,7 +153,7 @@ fn level(mesh: &Mesh, rows: &[Row], pulls: &[Pull], lack: &[f64], how: &Relaxati
     change
 }
 
-/// Standard deviation of the residuals of pulls that are not content, by their median: errors do not move it.
+/// Standard deviation of the residuals of active pulls, estimated from their median, which outliers do not affect.
 fn spread(pulls: &[Pull], left: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = pulls
         .iter()
@@ -169,7 +170,7 @@ fn spread(pulls: &[Pull], left: &[f64]) -> f64 {
 
 /// Exact pulls in cells of this size, on average over the cells that hold any.
 fn pulls_per_cell(pulls: &[Pull], size: f32) -> f32 {
-    let exact = || pulls.iter().filter(|p| p.wish == Wish::Exactly);
+    let exact = || pulls.iter().filter(|p| p.kind == PullKind::Exact);
     let cell = |p: &Pull| (Vec3::new(p.point.x, p.point.y.abs(), p.point.z) / size).floor().as_ivec3();
     let occupied: HashSet<_> = exact().map(cell).collect();
     exact().count() as f32 / occupied.len().max(1) as f32
@@ -177,16 +178,16 @@ fn pulls_per_cell(pulls: &[Pull], size: f32) -> f32 {
 
 /// The nodes of a lattice near the pulls; all others keep their value.
 struct Mesh {
-    /// Ascending.
+    /// Indices in the lattice, ascending.
     nodes: Vec<u32>,
-    /// Neighbours, as positions in `nodes`.
+    /// Pairs of neighbours, as positions in `nodes`.
     edges: Vec<[u32; 2]>,
-    /// Neighbours of each node that keep their value.
+    /// The number of each node's neighbours that keep their value.
     held: Vec<f64>,
 }
 
 impl Mesh {
-    /// Of all nodes up to [`REACH`] cells from those of `rows`, whose nodes become positions in the mesh.
+    /// The mesh of all nodes up to [`REACH`] cells from those of `rows`, whose nodes become positions in the mesh.
     fn around(rows: &mut [Row], size: [usize; 3]) -> Self {
         const OUT: u32 = u32::MAX;
         let [nx, ny, nz] = size;
@@ -236,7 +237,7 @@ struct System<'a> {
 }
 
 impl System<'_> {
-    /// Conjugate gradients from `x` on, preconditioned by the diagonal.
+    /// Conjugate gradients from the initial `x`, preconditioned by the diagonal.
     fn solve(&self, lack: &[f64], x: &mut [f64]) {
         let mut residual = vec![0.0; x.len()];
         for ((row, weight), lack) in self.rows.iter().zip(self.weights).zip(lack) {
@@ -280,7 +281,7 @@ impl System<'_> {
             out[b as usize] += slope;
         }
         for (row, weight) in self.rows.iter().zip(self.weights) {
-            row.add(weight * row.of(x), out);
+            row.add(weight * row.interpolate(x), out);
         }
     }
 
@@ -302,14 +303,14 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The eight nodes around a point, of the lattice or of a mesh, and their shares in its value.
+/// The eight nodes around a point, of the lattice or of a mesh, and their interpolation weights.
 struct Row {
     nodes: [u32; 8],
     shares: [f64; 8],
 }
 
 impl Row {
-    fn of(&self, values: &[f64]) -> f64 {
+    fn interpolate(&self, values: &[f64]) -> f64 {
         (0..8).map(|k| self.shares[k] * values[self.nodes[k] as usize]).sum()
     }
 
@@ -336,7 +337,7 @@ impl Lattice {
         Self { low, spacing, size, values: vec![0.0; size.iter().product()] }
     }
 
-    /// The same function with nodes half as far apart.
+    /// This function on a lattice of half the spacing.
     fn refined(&self) -> Self {
         let mut finer = Self {
             low: self.low,
@@ -363,7 +364,7 @@ impl Lattice {
         finer
     }
 
-    /// The cell of `p` or of its mirror image, and the place in it; outside, the nearest cell's face.
+    /// The cell of `p` or of its mirror image, and the position in it, clamped to the lattice.
     fn cell(&self, p: Vec3) -> (usize, Vec3) {
         let p = Vec3::new(p.x, p.y.abs(), p.z);
         let last = Vec3::from_array(self.size.map(|n| (n - 1) as f32));
@@ -417,7 +418,7 @@ mod tests {
         fade: 0.02,
     };
 
-    /// A box `by` metres larger than the true one to all sides.
+    /// A box that is `by` metres larger than the true one on all sides.
     fn fat(by: f32) -> Field {
         Field::carve(DVec3::new(-1.5, -1.1, -1.0), DVec3::new(1.5, 1.1, 1.0), 0.04, |p| {
             (TRUE + by - p.abs()).min_element()
@@ -428,7 +429,7 @@ mod tests {
         (i as f32 * 12.9898).sin().mul_add(43_758.547, 0.0).rem_euclid(1.0)
     }
 
-    /// On the true right face, y = -0.6, but every `wrong`-th anywhere in the fat box.
+    /// Pulls on the true right face, y = -0.6, but every `wrong`-th anywhere in the fat box.
     fn face(count: usize, wrong: usize) -> Vec<Pull> {
         let pull = |i: usize| {
             let r = Vec3::new(random(3 * i), random(3 * i + 1), random(3 * i + 2)) * 2.0 - 1.0;
@@ -436,12 +437,12 @@ mod tests {
                 true => r * (TRUE + 0.2),
                 false => Vec3::new(r.x * TRUE.x, -TRUE.y, r.z * TRUE.z),
             };
-            Pull { point, target: 0.0, wish: Wish::Exactly, weight: 1.0 }
+            Pull { point, target: 0.0, kind: PullKind::Exact, weight: 1.0 }
         };
         (0..count).map(pull).collect()
     }
 
-    /// How far the field's surface is from the true face, metres, at the median and the worst of places well on it.
+    /// Distance of the field's surface from the true face, metres: median and maximum over places well inside the face.
     fn error(field: &Field, side: f32) -> (f32, f32) {
         let surface = |x: f32, z: f32| {
             let inside = |k: &usize| field.sample(Vec3::new(x, side * (1.0 - 0.001 * *k as f32), z)) >= 0.0;
@@ -486,9 +487,9 @@ mod tests {
     }
 
     #[test]
-    fn without_pulls_or_with_content_ones_the_field_keeps_its_bytes() {
-        let content = Pull { point: Vec3::ZERO, target: 0.0, wish: Wish::AtLeast, weight: 1.0 };
-        for pulls in [vec![], vec![content]] {
+    fn without_active_pulls_the_field_is_unchanged() {
+        let inactive = Pull { point: Vec3::ZERO, target: 0.0, kind: PullKind::AtLeast, weight: 1.0 };
+        for pulls in [vec![], vec![inactive]] {
             let mut field = fat(0.2);
             relax(&mut field, None, &pulls, &HOW);
             assert_eq!(field.values(), fat(0.2).values());
@@ -501,19 +502,19 @@ mod tests {
         let far = |i: usize| Pull {
             point: Vec3::new(0.02 * i as f32 - 0.5, -0.8, 0.0),
             target: 0.0,
-            wish: Wish::AtLeast,
+            kind: PullKind::AtLeast,
             weight: 1.0,
         };
         let pulls: Vec<Pull> = (0..50).map(far).collect();
         relax(&mut field, Some(Ceiling { hull: &hull, slack: 0.01 }), &pulls, &HOW);
         assert!(field.values().iter().zip(hull.values()).all(|(f, h)| *f <= h + 0.0101));
         let face = field.sample(Vec3::new(0.0, -0.655, 0.0));
-        assert!(face > 0.0, "raised up to the ceiling: {face}");
+        assert!(face > 0.0, "not raised to the ceiling: {face}");
     }
 
     #[test]
     fn hostile_pulls_give_finite_fields() {
-        let pull = |x: f32| Pull { point: Vec3::splat(x), target: 0.0, wish: Wish::Exactly, weight: 1.0 };
+        let pull = |x: f32| Pull { point: Vec3::splat(x), target: 0.0, kind: PullKind::Exact, weight: 1.0 };
         for pulls in [vec![pull(1e30)], vec![pull(-1e30); 7], vec![pull(0.3); 10_000]] {
             let mut field = fat(0.2);
             relax(&mut field, None, &pulls, &HOW);

@@ -5,31 +5,31 @@ use vg_geometry::{Camera, Intrinsics};
 use vg_scene::View;
 use vg_scene::mask::{Label, Mask};
 
-/// Far away, in pixels; larger than any picture, small enough that its square is exact in f32.
+/// Distance without a feature, pixels; larger than any picture, small enough that its square is exact in f32.
 const FAR: f32 = 1e5;
 
-/// One view's silhouette, ready for look-ups.
+/// One view's silhouette as a signed distance field.
 pub struct Silhouette {
     width: usize,
     height: usize,
     /// Signed distance in pixels at pixel centres: positive where the vehicle may be. `[height * width]`
     distance: Vec<f32>,
-    /// Whether the silhouette is cut by the picture's left, top, right, bottom border: beyond that side the
-    /// view makes no statement, beyond the others there is no vehicle.
+    /// Whether the picture's left, top, right, bottom border cuts the silhouette: beyond such a side the vehicle may
+    /// continue, beyond the others it does not.
     cut: [bool; 4],
     camera_from_vehicle: (Mat3, Vec3),
     intrinsics: Intrinsics,
 }
 
 impl Silhouette {
-    /// From a pinhole view with a mask.
+    /// The silhouette of a pinhole view with a mask.
     pub fn new(view: &View) -> Self {
         let mask = view.mask.as_ref().expect("hull views have masks");
         let (width, height) = (mask.width() as usize, mask.height() as usize);
-        let silent = touches_unknown(mask);
+        let may_continue = touches_unknown(mask);
         let background = |i: usize| match mask.labels()[i] {
             Label::Background => true,
-            Label::Unknown => !silent,
+            Label::Unknown => !may_continue,
             Label::Vehicle => false,
         };
         let to_background = distance_transform(width, height, background);
@@ -54,18 +54,18 @@ impl Silhouette {
         }
     }
 
-    /// How far `point` (vehicle frame) is inside this view's cone, metres, negative outside; infinite where
-    /// the view makes no statement: behind the camera or beyond a border that cuts the silhouette.
+    /// Distance of `point` (vehicle frame) inside this view's cone, metres, negative outside; infinite beyond a border
+    /// that cuts the silhouette, and behind the camera if any border does.
     pub fn inside(&self, point: Vec3) -> f32 {
         self.inside_camera(self.camera_from_vehicle.0 * point + self.camera_from_vehicle.1)
     }
 
-    /// The same for a point in the camera's frame, for a camera that is moved.
+    /// [`Silhouette::inside`] for a point in the camera's frame, for a camera that is moved.
     pub(crate) fn inside_camera(&self, p: Vec3) -> f32 {
-        // Nearer than this, a point is inside the camera rather than in its picture.
+        // Nearest depth at which a point is projected.
         const NEAR_M: f32 = 0.05;
         if p.z < NEAR_M {
-            // A picture that shows the whole vehicle leaves none behind the camera.
+            // If the picture shows the whole vehicle, none of it is behind the camera.
             return if self.cut.contains(&true) { f32::INFINITY } else { p.z - NEAR_M - 1.0 };
         }
         let inverse_z = p.z.recip();
@@ -110,7 +110,7 @@ fn cut_sides(mask: &Mask) -> [bool; 4] {
     ]
 }
 
-/// Whether the vehicle may go on in pixels of which nothing is known: one of them has a vehicle neighbour.
+/// Whether the vehicle may continue in unknown pixels: one of them has a vehicle neighbour.
 fn touches_unknown(mask: &Mask) -> bool {
     let (w, h) = (mask.width(), mask.height());
     let unknown = |u: u32, v: u32| mask.labels()[(v * w + u) as usize] == Label::Unknown;
@@ -153,7 +153,7 @@ fn distance_transform(width: usize, height: usize, is_feature: impl Fn(usize) ->
     squared.iter().map(|d| d.sqrt().min(FAR)).collect()
 }
 
-/// Scratch of the one-dimensional transform.
+/// Buffers of the one-dimensional transform.
 struct Envelope {
     input: Vec<f32>,
     vertices: Vec<usize>,
@@ -165,7 +165,7 @@ impl Envelope {
         Self { input: vec![0.0; n], vertices: vec![0; n], starts: vec![0.0; n + 1] }
     }
 
-    /// row[x] becomes min over q of row[q] + (x - q)^2.
+    /// Replaces row[x] by the minimum over q of row[q] + (x - q)^2.
     fn transform(&mut self, row: &mut [f32]) {
         let f = &mut self.input;
         f.copy_from_slice(row);

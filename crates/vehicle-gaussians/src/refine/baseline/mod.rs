@@ -39,7 +39,7 @@ pub(crate) fn fit(
     let began = Instant::now();
     let settings = options.settings();
     let extent_m = start::extent_m(views, start);
-    let mut state = State::of(start, &[], views.len());
+    let mut state = State::new(start, &[], views.len());
     let mut work =
         Work::new(&state, views, &settings, Measures { noise: NOISE, extent_m, seed: options.seed })?;
     work.show_degree(0);

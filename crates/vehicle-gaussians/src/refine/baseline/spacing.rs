@@ -24,15 +24,15 @@ pub(super) fn spacing(points: &[[f32; 3]]) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::refine::chance::Chance;
+    use crate::refine::chance::Rng;
 
     #[test]
     fn a_points_size_is_that_of_looking_at_all_others() {
         for n in [0u64, 1, 2, 3, 9, 700] {
             let point = |i: u64| {
-                let mut chance = Chance::of([n, 1, i]);
+                let mut rng = Rng::new([n, 1, i]);
                 // A coarse grid: many coincide or are equally far.
-                [(); 3].map(|()| (chance.uniform() * 12.0).floor() as f32)
+                [(); 3].map(|()| (rng.uniform() * 12.0).floor() as f32)
             };
             let points: Vec<[f32; 3]> = (0..n).map(point).collect();
             let slowly = |i: usize| {

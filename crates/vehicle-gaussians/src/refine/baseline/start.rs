@@ -1,6 +1,6 @@
 //! What 3DGS starts from: points of a cloud where the scene has one, else points drawn from a box.
 
-use super::super::chance::{Chance, shuffled};
+use super::super::chance::{Rng, shuffled};
 use super::BaselineOptions;
 use super::spacing::spacing;
 use crate::prior::WorkingBox;
@@ -88,8 +88,8 @@ fn is_in_picture(view: &View, point: [f32; 3]) -> bool {
 /// Points spread evenly over a box.
 fn drawn(of: &WorkingBox, options: &BaselineOptions) -> Vec<[f32; 3]> {
     let point = |i: usize| {
-        let mut chance = Chance::of([options.seed, START, i as u64]);
-        std::array::from_fn(|k| (of.low[k] + chance.uniform() * (of.high[k] - of.low[k])) as f32)
+        let mut rng = Rng::new([options.seed, START, i as u64]);
+        std::array::from_fn(|k| (of.low[k] + rng.uniform() * (of.high[k] - of.low[k])) as f32)
     };
     (0..options.points).map(point).collect()
 }
@@ -98,13 +98,13 @@ fn drawn(of: &WorkingBox, options: &BaselineOptions) -> Vec<[f32; 3]> {
 fn made(points: &[[f32; 3]], options: &BaselineOptions) -> Gaussians {
     let mut gaussians = Gaussians::with_capacity(options.sh_degree, points.len());
     for (i, (mean, spacing)) in points.iter().zip(spacing(points)).enumerate() {
-        let mut chance = Chance::of([options.seed, START - 1, i as u64]);
+        let mut rng = Rng::new([options.seed, START - 1, i as u64]);
         gaussians.push(&Gaussian {
             mean: *mean,
             rotation: [1.0, 0.0, 0.0, 0.0],
             scale: [spacing.clamp(SCALE_M[0], SCALE_M[1]); 3],
             opacity: OPACITY,
-            sh0: [(); 3].map(|()| chance.uniform() as f32 / 255.0),
+            sh0: [(); 3].map(|()| rng.uniform() as f32 / 255.0),
         });
     }
     gaussians

@@ -1,9 +1,9 @@
-//! Adaptive density control (Kerbl et al. 2023, section 5.2), as their code does it.
+//! Adaptive density control (Kerbl et al. 2023, section 5.2), following the authors' code.
 //!
-//! Steps are watched (`seen`). Now and then (`options`) Gaussians whose place in the picture matters much get company:
-//! small ones are cloned, large ones split into two that are drawn from them; transparent and oversized ones go.
-//! Survivors keep the optimizer's state, others begin without. A clone that is tied to an original comes, divides and
-//! goes with it.
+//! Every step adds to statistics (`seen`). At intervals (`options`) Gaussians with a large gradient of the position in
+//! the picture are densified: small ones are cloned, large ones split into two that are drawn from them. Transparent
+//! and oversized ones are pruned. Survivors keep the optimizer's state, new ones start without. A clone that is tied to
+//! an original is cloned, split and pruned with it.
 
 mod options;
 mod seen;
@@ -12,32 +12,32 @@ pub use options::Densify;
 pub(super) use options::{MOST, Schedule, scaled};
 pub(super) use seen::Seen;
 
-use super::chance::Chance;
+use super::chance::Rng;
 use super::parameters::{Parameters, sigmoid};
 use super::tie::Clone as Tied;
 use glam::{Quat, Vec3};
 use serde::Serialize;
 
-/// Each half of a Gaussian is smaller than it by this factor.
+/// Factor by which each half of a split Gaussian is smaller.
 const SPLIT: f32 = 1.6;
 
-/// What density control did in a run.
+/// Totals of density control in a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Densified {
-    /// Originals that were cloned.
+    /// The number of originals that were cloned.
     pub cloned: usize,
-    /// Originals that were split in two.
+    /// The number of originals that were split in two.
     pub split: usize,
-    /// Originals that went.
+    /// The number of originals that were pruned.
     pub pruned: usize,
-    /// Times that opacities were reset.
+    /// The number of opacity resets.
     pub resets: u32,
-    /// Whether some got no company because there were enough.
+    /// Whether the limit on the number of Gaussians prevented some clones or splits.
     pub full: bool,
 }
 
 impl Densified {
-    /// Another growth.
+    /// Adds the totals of another growth.
     pub(super) fn add(&mut self, other: &Self) {
         self.cloned += other.cloned;
         self.split += other.split;
@@ -47,30 +47,30 @@ impl Densified {
     }
 }
 
-/// Who is there after a growth.
+/// The set of Gaussians after a growth.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Growth {
-    /// Of whom each one is made: survivors in their order, then copies, then halves, two of each. `[new n]`
+    /// Source of each new Gaussian: survivors in their order, then copies, then halves, two of each. `[new n]`
     pub(super) sources: Vec<u32>,
-    /// So many of them are survivors.
+    /// The number of survivors.
     pub(super) survivors: usize,
-    /// The first of the halves.
+    /// Index of the first half.
     halves: usize,
     pub(super) done: Densified,
 }
 
-/// What becomes of one.
+/// Action on one Gaussian.
 #[derive(Clone, Copy, PartialEq)]
 enum Fate {
-    Stays,
-    Goes,
-    IsCloned,
-    IsSplit,
+    Keep,
+    Prune,
+    Copy,
+    Split,
 }
 
 impl Growth {
-    /// By the rules; `None` where nobody would be left. `prunes_large` is false before the first reset of opacities.
-    pub(super) fn of(
+    /// Applies the rules; `None` if no Gaussian would be left. `prunes_large` is false before the first opacity reset.
+    pub(super) fn new(
         parameters: &Parameters,
         clones: &[Tied],
         seen: &Seen,
@@ -83,25 +83,25 @@ impl Growth {
             let size = parameters.scales(i).into_iter().fold(0.0, f32::max) / extent_m;
             let is_large = |size: f32| prunes_large && size > rules.largest;
             let is_wide = prunes_large && seen.radius_px(i) > rules.largest_px;
-            let wants = seen.gradient(i) >= rules.gradient && seen.gradient(i) > 0.0;
+            let grows = seen.gradient(i) >= rules.gradient && seen.gradient(i) > 0.0;
             match () {
-                () if sigmoid(parameters.logits[i]) < rules.least_opacity => Fate::Goes,
-                () if wants && size > rules.split_above && !is_large(size / SPLIT) => Fate::IsSplit,
-                () if is_large(size) || is_wide => Fate::Goes,
-                () if wants && size <= rules.split_above => Fate::IsCloned,
-                () => Fate::Stays,
+                () if sigmoid(parameters.logits[i]) < rules.least_opacity => Fate::Prune,
+                () if grows && size > rules.split_above && !is_large(size / SPLIT) => Fate::Split,
+                () if is_large(size) || is_wide => Fate::Prune,
+                () if grows && size <= rules.split_above => Fate::Copy,
+                () => Fate::Keep,
             }
         };
         let mut fates: Vec<Fate> = (0..n).map(fate).collect();
         let full = hold_back(&mut fates, clones, seen, rules.most);
 
-        let of = |wanted: &[Fate]| -> Vec<u32> {
-            let those = (0..n).filter(|&i| wanted.contains(&fates[i]));
-            those.map(|i| i as u32).collect()
+        let with_fate = |wanted: &[Fate]| -> Vec<u32> {
+            let indices = (0..n).filter(|&i| wanted.contains(&fates[i]));
+            indices.map(|i| i as u32).collect()
         };
-        let mut sources = of(&[Fate::Stays, Fate::IsCloned]);
+        let mut sources = with_fate(&[Fate::Keep, Fate::Copy]);
         let survivors = sources.len();
-        let (cloned, split) = (of(&[Fate::IsCloned]), of(&[Fate::IsSplit]));
+        let (cloned, split) = (with_fate(&[Fate::Copy]), with_fate(&[Fate::Split]));
         sources.extend(&cloned);
         let halves = sources.len();
         sources.extend(split.iter().flat_map(|&i| [i, i]));
@@ -110,13 +110,13 @@ impl Growth {
         (!sources.is_empty()).then_some(Self { sources, survivors, halves, done })
     }
 
-    /// The parameters afterwards. Halves lie where a draw from the Gaussian they are made of puts them; `key` tells the
-    /// run and the step.
+    /// The parameters after the growth. The centre of each half is drawn from the Gaussian that was split; `key`
+    /// identifies the run and the step.
     pub(super) fn grown(&self, parameters: &Parameters, key: [u64; 2]) -> Parameters {
         let mut grown = parameters.gathered(&self.sources);
         for i in self.halves..self.sources.len() {
-            let mut chance = Chance::of([key[0], key[1], i as u64]);
-            let draw = grown.scales(i).map(|scale| chance.normal() as f32 * scale);
+            let mut rng = Rng::new([key[0], key[1], i as u64]);
+            let draw = grown.scales(i).map(|scale| rng.normal() as f32 * scale);
             let [w, x, y, z] = grown.rotations[i];
             let moved = Vec3::from_array(grown.means[i])
                 + Quat::from_xyzw(x, y, z, w).normalize() * Vec3::from_array(draw);
@@ -128,28 +128,28 @@ impl Growth {
     }
 }
 
-/// Takes company back from those of the smallest gradients until there are at most `most`, tied clones counted; whether
-/// that was needed. Company of either kind is one more.
+/// Cancels clones and splits with the smallest gradients until there are at most `most` Gaussians, counting tied
+/// clones. Returns whether any was cancelled. A clone and a split each add one Gaussian.
 fn hold_back(fates: &mut [Fate], clones: &[Tied], seen: &Seen, most: usize) -> bool {
     let mut cost = vec![1; fates.len()];
     clones.iter().for_each(|clone| cost[clone.of as usize] += 1);
-    let there: usize = (0..fates.len()).filter(|&i| fates[i] != Fate::Goes).map(|i| cost[i]).sum();
+    let there: usize = (0..fates.len()).filter(|&i| fates[i] != Fate::Prune).map(|i| cost[i]).sum();
     let mut room = most.saturating_sub(there);
-    let mut want: Vec<usize> =
-        (0..fates.len()).filter(|&i| matches!(fates[i], Fate::IsCloned | Fate::IsSplit)).collect();
-    want.sort_by(|&a, &b| seen.gradient(b).total_cmp(&seen.gradient(a)).then(a.cmp(&b)));
+    let mut growing: Vec<usize> =
+        (0..fates.len()).filter(|&i| matches!(fates[i], Fate::Copy | Fate::Split)).collect();
+    growing.sort_by(|&a, &b| seen.gradient(b).total_cmp(&seen.gradient(a)).then(a.cmp(&b)));
     let mut full = false;
-    for i in want {
+    for i in growing {
         full |= cost[i] > room;
         match full {
-            true => fates[i] = Fate::Stays,
+            true => fates[i] = Fate::Keep,
             false => room -= cost[i],
         }
     }
     full
 }
 
-/// Opacities of at most 0.01: the original's reset.
+/// Limits opacities to 0.01, as the authors' code does.
 pub(super) fn reset_opacities(parameters: &mut Parameters) {
     /// logit(0.01)
     const RESET: f32 = -4.595_12;

@@ -1,26 +1,26 @@
-//! What a caller may choose of density control, and when it acts.
+//! Options and schedule of density control.
 
 use serde::Serialize;
 use vg_geometry::{Error, Result};
 
-/// Adaptive density control of 3DGS (Kerbl et al. 2023, section 5.2): Gaussians whose pictures are wrong get company,
-/// those that show nothing go. The defaults are the original's.
+/// Adaptive density control of 3DGS (Kerbl et al. 2023, section 5.2): Gaussians where pictures are wrong are cloned or
+/// split, those that show nothing are pruned. The defaults are those of the authors' code.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Densify {
-    /// A Gaussian gets company from this gradient of the loss on by its place in the picture, per half a picture, mean
-    /// over the steps that saw it.
+    /// Gradient of the loss by the position in the picture, per half a picture, from which a Gaussian is cloned or
+    /// split; mean over the steps that saw it.
     pub gradient: f32,
-    /// One of at most this size is cloned, a larger one split; its largest standard deviation, as a share of the extent.
+    /// Size above which a Gaussian is split instead of cloned: largest standard deviation as a share of the extent.
     pub split_above: f32,
-    /// Less opaque ones go.
+    /// Opacity below which a Gaussian is pruned.
     pub least_opacity: f32,
-    /// After the first reset of opacities larger ones go; as a share of the extent.
+    /// Size above which a Gaussian is pruned after the first opacity reset, as a share of the extent.
     pub largest: f32,
-    /// After the first reset of opacities those go whose three standard deviations were wider in a picture, pixels.
+    /// Three standard deviations in a picture above which a Gaussian is pruned after the first opacity reset, pixels.
     pub largest_px: f32,
-    /// Whether opacities are reset to 0.01 now and then: what is needed comes back.
+    /// Whether opacities are reset to 0.01 at intervals: needed Gaussians become opaque again.
     pub resets: bool,
-    /// No more Gaussians than this, clones counted; where all cannot have company, those of the largest gradients do.
+    /// Maximum of Gaussians, clones counted; at the limit, those with the largest gradients are cloned or split first.
     pub most: usize,
 }
 
@@ -39,12 +39,12 @@ impl Default for Densify {
 }
 
 impl Densify {
-    /// For a model that is good already and a few hundred steps, in which opacities that were reset do not come back.
-    pub fn of_refinement() -> Self {
+    /// Options for a few hundred steps on a good model: without resets, from which opacities could not recover in time.
+    pub fn for_refinement() -> Self {
         Self { resets: false, ..Self::default() }
     }
 
-    /// Each field in its range; `argument` is the name of this.
+    /// Checks that each field is in its range; `argument` names these options in errors.
     pub(in crate::refine) fn validate(&self, argument: &str) -> Result<()> {
         let shares = [
             ("gradient", self.gradient, f32::MAX, "0 or more, finite"),
@@ -66,22 +66,21 @@ impl Densify {
     }
 }
 
-/// Of about 1.5 kB each, with gradients and the optimizer's state.
+/// Upper limit of [`Densify::most`]: a Gaussian takes about 1.5 kB, with gradients and the optimizer's state.
 pub(in crate::refine) const MOST: usize = 10_000_000;
 
-/// Steps of the original's run; its schedule is told for them, and in a shorter run every number of it is shorter by
-/// the same factor.
+/// Steps of a run in the paper, to which the schedule refers; a shorter run scales the whole schedule down.
 pub(in crate::refine) const FULL_RUN: u32 = 30_000;
 
-/// Mean gradients over fewer steps are noise of single views.
+/// Minimum of steps between growths: mean gradients over fewer steps are dominated by single views.
 const SHORTEST_INTERVAL: u32 = 20;
 
-/// Numbers of a schedule in a run of `planned` steps: what is `steps` in the original's.
+/// The number of steps in a run of `planned` steps that corresponds to `steps` of a full run.
 pub(in crate::refine) fn scaled(steps: u32, planned: u32) -> u32 {
     (u64::from(steps) * u64::from(planned.min(FULL_RUN)) / u64::from(FULL_RUN)) as u32
 }
 
-/// When density control acts, in steps that were made.
+/// Schedule of density control, in steps made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::refine) struct Schedule {
     from: u32,
@@ -91,7 +90,7 @@ pub(in crate::refine) struct Schedule {
 }
 
 impl Schedule {
-    pub(in crate::refine) fn of(planned: u32) -> Self {
+    pub(in crate::refine) fn new(planned: u32) -> Self {
         let scaled = |steps| scaled(steps, planned);
         Self {
             from: scaled(500),
@@ -101,23 +100,23 @@ impl Schedule {
         }
     }
 
-    /// Whether Gaussians come and go after this step.
+    /// Whether Gaussians are cloned, split and pruned after this step.
     pub(in crate::refine) fn grows_at(&self, step: u32) -> bool {
         step > self.from && step < self.until && step.is_multiple_of(self.every)
     }
 
-    /// Whether opacities are reset after this step. On a white background once more before anything grows.
+    /// Whether opacities are reset after this step. The reset before the first growth is for a white background.
     pub(in crate::refine) fn resets_at(&self, step: u32) -> bool {
         step < self.until && (step.is_multiple_of(self.reset_every) || step == self.from)
     }
 
-    /// Whether large ones go.
+    /// Whether growths after this step prune large Gaussians.
     pub(in crate::refine) fn prunes_large_at(&self, step: u32) -> bool {
         step > self.reset_every
     }
 
-    /// Whether gradients are still looked at after this step.
-    pub(in crate::refine) fn looks_at(&self, step: u32) -> bool {
+    /// Whether gradients are still collected after this step.
+    pub(in crate::refine) fn collects_at(&self, step: u32) -> bool {
         step < self.until
     }
 }
@@ -127,19 +126,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_schedule_is_the_originals_and_a_shorter_run_has_a_shorter_one() {
-        let full = Schedule::of(30_000);
+    fn a_full_run_has_the_papers_schedule_and_a_shorter_run_scales_it() {
+        let full = Schedule::new(30_000);
         assert_eq!(full, Schedule { from: 500, until: 15_000, every: 100, reset_every: 3_000 });
-        assert_eq!(full, Schedule::of(100_000));
+        assert_eq!(full, Schedule::new(100_000));
         let growths = |s: Schedule| (0..40_000).filter(|&i| s.grows_at(i)).count();
         let resets = |s: Schedule| (1..40_000).filter(|&i| s.resets_at(i)).collect::<Vec<_>>();
         assert_eq!((growths(full), resets(full)), (144, vec![500, 3_000, 6_000, 9_000, 12_000]));
-        let tenth = Schedule::of(3_000);
+        let tenth = Schedule::new(3_000);
         assert_eq!((growths(tenth), resets(tenth)), (72, vec![50, 300, 600, 900, 1_200]));
         assert!(!full.prunes_large_at(3_000) && full.prunes_large_at(3_100));
-        // Too short to do anything in.
+        // Runs that are too short for any growth.
         for planned in 0..20 {
-            assert_eq!(growths(Schedule::of(planned)), 0);
+            assert_eq!(growths(Schedule::new(planned)), 0);
         }
     }
 }

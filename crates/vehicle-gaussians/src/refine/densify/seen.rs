@@ -1,10 +1,11 @@
-//! What steps say of each Gaussian: how much its place in the picture matters, and how large it is there.
+//! Statistics of each Gaussian over the steps: the loss gradient by its position in the picture, and its size there.
 //!
-//! The renderer tells the gradient by centres in metres. With x and y the camera's axes, a centre's pixel is
-//! (fx x/z, fy y/z), so that moving it along x at the same depth moves the pixel by fx/z and nothing else: the
-//! gradient by the pixel is z/fx that by x. Left in it is what x says of the shape in the picture, through the
-//! projection's Jacobian, and of the colour, through the direction; both are small beside the place for Gaussians that
-//! are small beside their distance. The original measures from -1 to 1 across the picture: times half its size.
+//! The renderer returns the gradient by centres in metres. With x and y the camera's axes, a centre's pixel is
+//! (fx x/z, fy y/z), so that moving it along x at the same depth moves the pixel by fx/z alone: the
+//! gradient by the pixel is z/fx times that by x. It still contains the effect of x on the shape in the picture,
+//! through the projection's Jacobian, and on the colour, through the direction; both are small relative to that of the
+//! position if the Gaussian is small relative to its distance. The authors' code measures from -1 to 1 across the
+//! picture: times half its size.
 
 use super::super::tie::Clone as Tied;
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -14,30 +15,30 @@ use vg_splat::Gaussians;
 use vg_splat::render::Gradients;
 use vg_splat::render::options::{PROJECTION_MARGIN, RenderOptions};
 
-/// Gaussians one task works on.
+/// Gaussians per task.
 const CHUNK: usize = 1 << 10;
 
-/// Sums over the steps since the last growth, for each original; what a clone shows counts for its original.
+/// Sums over the steps since the last growth, for each original; a clone counts for its original.
 #[derive(Clone, Debug, Default)]
 pub(in crate::refine) struct Seen {
-    /// Lengths of gradients, per half a picture. `[n]`
+    /// Sum of the lengths of gradients, per half a picture. `[n]`
     gradients: Vec<f32>,
-    /// How many. `[n]`
+    /// The number of gradients in the sum. `[n]`
     times: Vec<u32>,
     /// Largest radius in a picture, pixels. `[n]`
     radii_px: Vec<f32>,
-    /// Of one step: gradient and radius of what was in the picture, originals and clones. `[n + clones]`
+    /// Gradient and radius in the latest step of originals and clones that were in the picture. `[n + clones]`
     latest: Vec<Option<[f32; 2]>>,
 }
 
 impl Seen {
-    /// As if a single step had said this.
+    /// Statistics of a single step.
     #[cfg(test)]
     pub(super) fn with(gradients: Vec<f32>, radii_px: Vec<f32>) -> Self {
         Self { times: vec![1; gradients.len()], gradients, radii_px, latest: Vec::new() }
     }
 
-    /// Of `n` originals, none of them seen.
+    /// Resets to `n` originals that no step has seen.
     pub(in crate::refine) fn reset(&mut self, n: usize) {
         self.gradients.clear();
         self.times.clear();
@@ -47,7 +48,7 @@ impl Seen {
         self.radii_px.resize(n, 0.0);
     }
 
-    /// One step's picture: Gaussians as they were drawn, originals before clones, and the gradients of all of them.
+    /// Adds one step: the rendered Gaussians, originals before clones, and the gradients of all of them.
     pub(in crate::refine) fn note(
         &mut self,
         gaussians: &Gaussians,
@@ -55,9 +56,9 @@ impl Seen {
         camera: &Camera,
         clones: &[Tied],
     ) {
-        let look = Look::of(camera);
+        let projection = Projection::new(camera);
         let all = (0..gaussians.len()).into_par_iter().with_min_len(CHUNK);
-        all.map(|i| look.at(gaussians, i, gradients.means[i])).collect_into_vec(&mut self.latest);
+        all.map(|i| projection.measure(gaussians, i, gradients.means[i])).collect_into_vec(&mut self.latest);
         let n = gaussians.len() - clones.len();
         for (i, seen) in self.latest.iter().enumerate() {
             let Some([gradient, radius_px]) = *seen else { continue };
@@ -68,7 +69,7 @@ impl Seen {
         }
     }
 
-    /// Mean gradient of an original over the pictures it was in; 0 where it was in none.
+    /// Mean gradient of an original over the pictures that it was in; 0 if it was in none.
     pub(super) fn gradient(&self, i: usize) -> f32 {
         self.gradients[i] / self.times[i].max(1) as f32
     }
@@ -79,12 +80,12 @@ impl Seen {
     }
 }
 
-/// A camera, ready to be asked.
-struct Look {
+/// A camera's projection, precomputed.
+struct Projection {
     camera_from_vehicle: DMat3,
     center: DVec3,
     focal: DVec2,
-    /// x/z and y/z at which the Jacobian is taken at most.
+    /// Range to which x/z and y/z are clamped for the Jacobian.
     least: DVec2,
     most: DVec2,
     principal: DVec2,
@@ -92,8 +93,8 @@ struct Look {
     options: RenderOptions,
 }
 
-impl Look {
-    fn of(camera: &Camera) -> Self {
+impl Projection {
+    fn new(camera: &Camera) -> Self {
         let i = camera.intrinsics;
         let (focal, principal) = (DVec2::new(i.fx, i.fy), DVec2::new(i.cx, i.cy));
         let size = DVec2::new(camera.width.into(), camera.height.into());
@@ -110,8 +111,9 @@ impl Look {
         }
     }
 
-    /// Gradient per half a picture, and the radius in pixels, of what is in the picture.
-    fn at(&self, gaussians: &Gaussians, i: usize, of_mean: [f32; 3]) -> Option<[f32; 2]> {
+    /// Gradient per half a picture and radius in pixels of Gaussian `i`; `None` if it is not in the picture. `of_mean`
+    /// is the gradient of its centre.
+    fn measure(&self, gaussians: &Gaussians, i: usize, of_mean: [f32; 3]) -> Option<[f32; 2]> {
         let vector = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
         let p = self.camera_from_vehicle * (vector(gaussians.means()[i]) - self.center);
         if p.z < f64::from(self.options.near) {
@@ -161,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gradient_by_the_pixel_is_that_of_moving_the_picture() {
+    fn the_gradient_by_the_pixel_equals_that_of_moving_the_picture() {
         // The loss is the sum of weights that grow along both axes times alpha: moving the blob by a pixel changes it
         // by the slope times all of its alpha.
         let (camera, gaussians) = (camera(), blob([0.1, -0.1, 0.2], 0.05));
@@ -177,24 +179,24 @@ mod tests {
         let gradients = renderer.backward(&gaussians, &camera, &options, &gradient).unwrap();
         let alpha: f64 = picture.alpha.iter().map(|a| f64::from(*a)).sum();
         let expected = 1e-3 * alpha * (slope * DVec2::new(32.0, 24.0)).length();
-        let [found, _] = Look::of(&camera).at(&gaussians, 0, gradients.means[0]).unwrap();
-        // The shape's share of the gradient, and the threshold on alpha.
+        let [found, _] = Projection::new(&camera).measure(&gaussians, 0, gradients.means[0]).unwrap();
+        // The tolerance covers the shape's share of the gradient and the threshold on alpha.
         assert!((f64::from(found) / expected - 1.0).abs() < 0.03, "{found} {expected}");
     }
 
     #[test]
-    fn what_is_not_in_the_picture_is_not_seen() {
-        let of = |mean: [f32; 3]| Look::of(&camera()).at(&blob(mean, 0.05), 0, [1.0; 3]);
+    fn gaussians_outside_the_picture_are_not_measured() {
+        let measure = |mean: [f32; 3]| Projection::new(&camera()).measure(&blob(mean, 0.05), 0, [1.0; 3]);
         let eye = camera().center().as_vec3().to_array();
-        assert!(of([0.0; 3]).is_some() && of(eye).is_none() && of([30.0, 0.0, 0.0]).is_none());
-        assert!(of(eye.map(|c| 3.0 * c)).is_none());
+        assert!(measure([0.0; 3]).is_some() && measure(eye).is_none() && measure([30.0, 0.0, 0.0]).is_none());
+        assert!(measure(eye.map(|c| 3.0 * c)).is_none());
         // A radius is three standard deviations.
-        let [_, radius] = of([0.0; 3]).unwrap();
+        let [_, radius] = measure([0.0; 3]).unwrap();
         assert!((radius - 3.0 * (0.05f32 / 4.0 * 90.0).hypot(0.3f32.sqrt())).abs() < 0.1, "{radius}");
     }
 
     #[test]
-    fn what_a_clone_shows_counts_for_its_original() {
+    fn a_clones_gradient_counts_for_its_original() {
         let mut seen = Seen::default();
         let mut both = blob([0.1, 0.1, 0.0], 0.05);
         both.append(&blob([0.1, -0.1, 0.0], 0.05));

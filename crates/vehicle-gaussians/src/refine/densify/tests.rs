@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Standard deviations and opacities of Gaussians in a row, and gradients that were seen of them.
+/// Gaussians in a row with these standard deviations, opacities and measured gradients.
 fn row(of: &[(f32, f32, f32)]) -> (Parameters, Seen) {
     let logit = |o: f32| (o / (1.0 - o)).ln();
     let parameters = Parameters {
@@ -19,14 +19,15 @@ fn row(of: &[(f32, f32, f32)]) -> (Parameters, Seen) {
 
 /// An extent of 1 m: sizes in metres are shares of it.
 fn growth(of: &(Parameters, Seen), clones: &[Tied], rules: Densify, prunes_large: bool) -> Option<Growth> {
-    Growth::of(&of.0, clones, &of.1, &rules, 1.0, prunes_large)
+    Growth::new(&of.0, clones, &of.1, &rules, 1.0, prunes_large)
 }
 
-const NEEDY: f32 = 3e-4;
+/// A gradient above the default threshold.
+const ABOVE: f32 = 3e-4;
 
 #[test]
-fn small_ones_are_cloned_large_ones_split_and_the_content_stay() {
-    let of = row(&[(0.005, 0.5, NEEDY), (0.02, 0.5, NEEDY), (0.005, 0.5, 1e-4), (0.02, 0.5, 0.0)]);
+fn above_the_gradient_small_ones_are_cloned_and_large_ones_split() {
+    let of = row(&[(0.005, 0.5, ABOVE), (0.02, 0.5, ABOVE), (0.005, 0.5, 1e-4), (0.02, 0.5, 0.0)]);
     let found = growth(&of, &[], Densify::default(), false).unwrap();
     assert_eq!((found.sources.as_slice(), found.survivors), ([0, 2, 3, 0, 1, 1].as_slice(), 3));
     let done = Densified { cloned: 1, split: 1, ..Densified::default() };
@@ -48,8 +49,8 @@ fn small_ones_are_cloned_large_ones_split_and_the_content_stay() {
 }
 
 #[test]
-fn halves_are_drawn_from_what_they_are_made_of() {
-    let of = row(&vec![(0.02, 0.5, NEEDY); 4_000]);
+fn halves_are_drawn_from_the_gaussian_that_was_split() {
+    let of = row(&vec![(0.02, 0.5, ABOVE); 4_000]);
     let grown = growth(&of, &[], Densify::default(), false).unwrap().grown(&of.0, [0, 9]);
     assert_eq!(grown.len(), 8_000);
     // Along the longest axis, which the rotation turns towards -z, the deviation is 0.02; along the second 0.01.
@@ -68,19 +69,19 @@ fn halves_are_drawn_from_what_they_are_made_of() {
 
 #[test]
 fn draws_depend_on_seed_and_step_alone() {
-    let of = row(&[(0.02, 0.5, NEEDY), (0.02, 0.5, NEEDY)]);
+    let of = row(&[(0.02, 0.5, ABOVE), (0.02, 0.5, ABOVE)]);
     let grown = |key| growth(&of, &[], Densify::default(), false).unwrap().grown(&of.0, key).means;
     assert_eq!(grown([1, 2]), grown([1, 2]));
     assert!(grown([1, 2]) != grown([1, 3]) && grown([1, 2]) != grown([2, 2]));
 }
 
 #[test]
-fn transparent_ones_go_and_large_ones_after_the_first_reset() {
+fn transparent_ones_are_pruned_and_large_ones_after_the_first_reset() {
     let mut of = row(&[
-        (0.005, 0.004, NEEDY),
+        (0.005, 0.004, ABOVE),
         (0.2, 0.5, 0.0),
-        (0.15, 0.5, NEEDY),
-        (0.3, 0.5, NEEDY),
+        (0.15, 0.5, ABOVE),
+        (0.3, 0.5, ABOVE),
         (0.01, 0.5, 0.0),
     ]);
     let sources = |of: &_, prunes| growth(of, &[], Densify::default(), prunes).unwrap().sources;
@@ -89,11 +90,11 @@ fn transparent_ones_go_and_large_ones_after_the_first_reset() {
     assert_eq!(sources(&of, true), [4, 2, 2]);
     of.1 = Seen::with(vec![0.0; 5], vec![1.0, 1.0, 1.0, 1.0, 21.0]);
     assert_eq!(sources(&of, false), [1, 2, 3, 4]);
-    assert_eq!(growth(&of, &[], Densify::default(), true), None, "nobody would be left");
+    assert_eq!(growth(&of, &[], Densify::default(), true), None, "no Gaussian would be left");
 }
 
 #[test]
-fn of_too_many_those_with_the_largest_gradients_get_company() {
+fn at_the_limit_the_largest_gradients_grow_first() {
     let of = row(&[(0.005, 0.5, 3e-4), (0.02, 0.5, 5e-4), (0.005, 0.5, 4e-4), (0.005, 0.001, 1.0)]);
     let of_most = |most: usize, clones: &[Tied]| {
         let found = growth(&of, clones, Densify { most, ..Densify::default() }, false).unwrap();
@@ -109,7 +110,7 @@ fn of_too_many_those_with_the_largest_gradients_get_company() {
 }
 
 #[test]
-fn a_reset_makes_the_opaque_transparent_and_nothing_opaque() {
+fn a_reset_lowers_opacities_and_raises_none() {
     let (mut parameters, _) = row(&[(0.1, 0.9, 0.0), (0.1, 0.006, 0.0)]);
     reset_opacities(&mut parameters);
     assert!((sigmoid(parameters.logits[0]) - 0.01).abs() < 1e-6);
@@ -117,7 +118,7 @@ fn a_reset_makes_the_opaque_transparent_and_nothing_opaque() {
 }
 
 #[test]
-fn no_gradient_is_no_reason_whatever_the_threshold() {
+fn without_a_gradient_nothing_grows_whatever_the_threshold() {
     let of = row(&[(0.005, 0.5, 0.0), (0.005, 0.5, f32::INFINITY)]);
     let found = growth(&of, &[], Densify { gradient: 0.0, ..Densify::default() }, false).unwrap();
     assert_eq!(found.sources, [0, 1, 1]);

@@ -1,6 +1,6 @@
 //! `cameras.bin`, `images.bin`, `points3D.bin`: little-endian records after a 64-bit count.
 
-use super::model::{ModelCamera, ModelImage, SparsePoints, model_of_id};
+use super::model::{ModelCamera, ModelImage, SparsePoints, model_from_id};
 use std::collections::HashMap;
 use std::path::Path;
 use vg_geometry::{Error, Result};
@@ -21,7 +21,7 @@ pub fn cameras_from_binary(bytes: &[u8], path: &Path) -> Result<HashMap<u32, Mod
     for _ in 0..count {
         records.next_record();
         let id = records.u32()?;
-        let model = model_of_id(records.u32()? as i32, id, path)?;
+        let model = model_from_id(records.u32()? as i32, id, path)?;
         let size = (records.u64()?, records.u64()?);
         let params = (0..model.parameter_count()).map(|_| records.f64()).collect::<Result<_>>()?;
         if cameras.insert(id, ModelCamera::new(id, model, size, params, path)?).is_some() {
@@ -71,7 +71,7 @@ pub fn points_from_binary(bytes: &[u8], path: &Path) -> Result<SparsePoints> {
     Ok(points)
 }
 
-/// The bytes not yet read, and which record they belong to.
+/// The unread bytes, and the number of the record that they belong to.
 struct Records<'a> {
     rest: &'a [u8],
     path: &'a Path,
@@ -103,7 +103,7 @@ impl<'a> Records<'a> {
             0 => "count".to_owned(),
             record => format!("{} record {record} of {}", self.kind, self.count),
         };
-        Error::format(self.path, field, "the file ends inside it; allowed: a whole model")
+        Error::format(self.path, field, "the file ends inside it; allowed: a complete model")
     }
 
     fn take<const N: usize>(&mut self) -> Result<[u8; N]> {
@@ -145,7 +145,7 @@ impl<'a> Records<'a> {
         }
     }
 
-    /// Nothing may follow: a count that is too small would silently lose records.
+    /// Returns an error if bytes follow: a count that is too small would silently lose records.
     fn end(&self) -> Result<()> {
         if self.rest.is_empty() {
             return Ok(());

@@ -1,6 +1,6 @@
 //! COLMAP's sparse models, binary and text: cameras and posed images, and the sparse points.
 //!
-//! Versions 3.12 and later write `rigs` and `frames` beside `cameras` and `images`; the images keep their own
+//! Versions 3.12 and later write `rigs` and `frames` in addition to `cameras` and `images`; the images keep their own
 //! poses, so that the two files that all versions have are enough.
 
 mod binary;

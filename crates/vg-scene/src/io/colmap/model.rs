@@ -1,4 +1,4 @@
-//! A model as its files describe it, checked as a whole.
+//! COLMAP models as their files describe them, with checks across files.
 
 use super::{binary, text};
 use crate::io::files::{in_file, is_there, open_regular, read_limited, relative_inside};
@@ -16,22 +16,22 @@ const MAX_FILE: u64 = 2 << 30;
 /// Cameras and posed images of a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
-    /// By COLMAP's camera id, which need not be dense.
+    /// Cameras by COLMAP's camera id; ids may have gaps.
     pub cameras: HashMap<u32, ModelCamera>,
-    /// Sorted by name: the order of the files means nothing.
+    /// Images sorted by name; their order in the files is arbitrary.
     pub images: Vec<ModelImage>,
 }
 
-/// One camera, its numbers checked.
+/// One camera with checked parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelCamera {
-    /// One of the models that are understood.
+    /// Camera model, one of those that are supported.
     pub model: CameraModel,
     /// Columns.
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// In COLMAP's order.
+    /// Parameters in COLMAP's order.
     pub params: Vec<f64>,
 }
 
@@ -44,20 +44,20 @@ pub struct ModelImage {
     pub name: PathBuf,
     /// COLMAP's camera id.
     pub camera_id: u32,
-    /// In the model's own gauge.
+    /// Pose in the model's own gauge.
     pub world_from_camera: Pose,
 }
 
-/// The points of a model, in its own gauge.
+/// The sparse points of a model, in its own gauge.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SparsePoints {
-    /// Equally many as colours.
+    /// Positions, as many as colours.
     pub positions: Vec<[f64; 3]>,
-    /// RGB.
+    /// Colours, RGB.
     pub colors: Vec<[u8; 3]>,
 }
 
-/// Names of camera models that are known but not understood, by id, for the error.
+/// Names of unsupported camera models, by id minus 7, for the error.
 const OTHER_MODELS: [&str; 11] = [
     "FOV",
     "SIMPLE_RADIAL_FISHEYE",
@@ -72,8 +72,8 @@ const OTHER_MODELS: [&str; 11] = [
     "EQUIRECTANGULAR",
 ];
 
-/// The model's folder at or below `folder`: `sparse/0`, `sparse`, `folder` itself, or `0`. Of several numbered models
-/// it is the one with the most images: COLMAP writes one for each part of a scene that it could not join.
+/// The model's folder at or below `folder`: `sparse/0`, `sparse`, `folder` itself, or `0`. If there are several
+/// numbered models, the one with the most images: COLMAP writes one for each part of a scene that it could not join.
 pub fn find_model(folder: &Path) -> Option<PathBuf> {
     find(folder).map(|found| found.folder)
 }
@@ -81,11 +81,11 @@ pub fn find_model(folder: &Path) -> Option<PathBuf> {
 /// A model that was found.
 pub(crate) struct Found {
     pub(crate) folder: PathBuf,
-    /// Which of several it is.
+    /// Note on the choice among several models.
     pub(crate) note: Option<String>,
 }
 
-/// As [`find_model`].
+/// [`find_model`] with a note on the choice.
 pub(crate) fn find(folder: &Path) -> Option<Found> {
     let plain = |folder: PathBuf| extension_of(&folder).is_some().then_some(Found { folder, note: None });
     let sparse = folder.join("sparse");
@@ -95,7 +95,7 @@ pub(crate) fn find(folder: &Path) -> Option<Found> {
         .or_else(|| largest(folder))
 }
 
-/// The model with the most images of those in numbered folders, the first of equals.
+/// The model with the most images among those in numbered folders; the first if several have the most.
 fn largest(folder: &Path) -> Option<Found> {
     let mut numbered: Vec<(u32, PathBuf)> = std::fs::read_dir(folder)
         .into_iter()
@@ -117,7 +117,7 @@ fn largest(folder: &Path) -> Option<Found> {
     let others: Vec<String> =
         models[1..].iter().map(|(images, path)| format!("{} has {images}", path.display())).collect();
     let note = format!(
-        "{}: taken of {} COLMAP models, with {} images; {}",
+        "{}: chosen among {} COLMAP models, with {} images; {}",
         folder.display(),
         models.len(),
         models[0].0,
@@ -126,7 +126,7 @@ fn largest(folder: &Path) -> Option<Found> {
     Some(Found { folder, note: Some(note) })
 }
 
-/// How many images a model says it has; 0 where it cannot be read, which reading it says better.
+/// The number of images of a model; 0 if it cannot be read, which is reported when the model is read.
 fn image_count(folder: &Path) -> usize {
     let binary = folder.join("images.bin");
     let counted = match extension_of(folder) {
@@ -144,7 +144,7 @@ fn image_count(folder: &Path) -> usize {
     counted.unwrap_or(0)
 }
 
-/// Reads `cameras` and `images` of the model in `folder`, the binary files where there are both kinds.
+/// Reads `cameras` and `images` of the model in `folder`; binary files take precedence over text.
 pub fn read_model(folder: &Path) -> Result<Model> {
     let Some(extension) = extension_of(folder) else {
         let reason = "missing; allowed: cameras.bin and images.bin, or cameras.txt and images.txt";
@@ -164,7 +164,7 @@ pub fn read_model(folder: &Path) -> Result<Model> {
     Model::new(cameras, images, &images_path)
 }
 
-/// Reads the sparse points of the model in `folder`, or `None` where it has no file of them.
+/// Reads the sparse points of the model in `folder`; `None` if there is no such file.
 pub fn read_points(folder: &Path) -> Result<Option<SparsePoints>> {
     let (binary, text) = (folder.join("points3D.bin"), folder.join("points3D.txt"));
     if is_there(&binary) {
@@ -183,7 +183,7 @@ fn extension_of(folder: &Path) -> Option<&'static str> {
 }
 
 impl Model {
-    /// Images refer to cameras that exist, and no two have one name; `path` is the images file, for messages.
+    /// A model whose images refer to existing cameras and have unique names; `path` is the images file, for messages.
     pub fn new(cameras: HashMap<u32, ModelCamera>, mut images: Vec<ModelImage>, path: &Path) -> Result<Self> {
         if images.is_empty() {
             return Err(Error::format(path, "images", "none; allowed: at least one registered image"));
@@ -207,7 +207,7 @@ impl Model {
         Ok(Self { cameras, images })
     }
 
-    /// The camera of an image, its pose being `world_from_camera`.
+    /// The camera of an image; its pose is `world_from_camera`.
     pub fn camera_of(&self, image: &ModelImage) -> Result<Camera> {
         let camera = self.cameras.get(&image.camera_id).ok_or_else(|| {
             let found = image.camera_id.to_string();
@@ -218,7 +218,7 @@ impl Model {
 }
 
 impl ModelCamera {
-    /// Checks the numbers of camera `id`.
+    /// Camera `id`, after a check of its parameters.
     pub(super) fn new(
         id: u32,
         model: CameraModel,
@@ -240,7 +240,7 @@ impl ModelCamera {
 }
 
 impl ModelImage {
-    /// Checks the numbers and the name of image `id`.
+    /// Image `id`, after a check of its pose and name.
     pub(super) fn new(
         id: u32,
         qvec_wxyz: [f64; 4],
@@ -273,16 +273,16 @@ impl SparsePoints {
     }
 }
 
-/// A camera model by its number, or an error that says its name and what to do.
-pub(super) fn model_of_id(model_id: i32, camera_id: u32, path: &Path) -> Result<CameraModel> {
+/// The camera model of a number; an error with its name and the way out if it is not supported.
+pub(super) fn model_from_id(model_id: i32, camera_id: u32, path: &Path) -> Result<CameraModel> {
     CameraModel::from_id(model_id).ok_or_else(|| {
         let other = usize::try_from(model_id).ok().and_then(|i| OTHER_MODELS.get(i.checked_sub(7)?));
         unknown_model(other.map_or(&format!("model {model_id}"), |name| name), camera_id, path)
     })
 }
 
-/// A camera model by its name, likewise.
-pub(super) fn model_of_name(name: &str, camera_id: u32, path: &Path) -> Result<CameraModel> {
+/// The camera model of a name; an error with the way out if it is not supported.
+pub(super) fn model_from_name(name: &str, camera_id: u32, path: &Path) -> Result<CameraModel> {
     CameraModel::from_name(name).ok_or_else(|| unknown_model(name, camera_id, path))
 }
 

@@ -1,6 +1,6 @@
 //! `cameras.txt`, `images.txt`, `points3D.txt`: lines of words, `#` begins a comment line.
 
-use super::model::{ModelCamera, ModelImage, SparsePoints, model_of_name};
+use super::model::{ModelCamera, ModelImage, SparsePoints, model_from_name};
 use std::collections::HashMap;
 use std::path::Path;
 use std::str::FromStr;
@@ -12,7 +12,7 @@ pub fn cameras_from_text(bytes: &[u8], path: &Path) -> Result<HashMap<u32, Model
     for line in Line::all(bytes, path).filter(Line::is_record) {
         let mut words = line.words()?;
         let id = words.number("CAMERA_ID")?;
-        let model = model_of_name(words.word("MODEL")?, id, path)?;
+        let model = model_from_name(words.word("MODEL")?, id, path)?;
         let size = (words.number("WIDTH")?, words.number("HEIGHT")?);
         let mut params = Vec::new();
         while !words.is_empty() && params.len() <= model.parameter_count() {
@@ -65,7 +65,7 @@ pub fn points_from_text(bytes: &[u8], path: &Path) -> Result<SparsePoints> {
     Ok(points)
 }
 
-/// A line with its number, which counts from 1.
+/// A line with its number, starting at 1.
 struct Line<'a> {
     bytes: &'a [u8],
     number: usize,
@@ -78,7 +78,7 @@ impl<'a> Line<'a> {
         lines.map(move |(i, line)| Self { bytes: line.trim_ascii(), number: i + 1, path })
     }
 
-    /// Whether it is neither empty nor a comment.
+    /// Whether the line is neither empty nor a comment.
     fn is_record(&self) -> bool {
         !self.bytes.is_empty() && self.bytes[0] != b'#'
     }
@@ -88,8 +88,8 @@ impl<'a> Line<'a> {
         Ok(Words { rest, number: self.number, path: self.path })
     }
 
-    /// Whether these are features, triples of X Y POINT3D_ID. A model whose empty lines were removed has the next image
-    /// here, which would be lost.
+    /// Returns an error unless the line holds features, triples of X Y POINT3D_ID. In a model whose empty lines were
+    /// removed it is the next image, which would be lost.
     fn check_features(&self) -> Result<()> {
         let mut words = self.words()?.rest.split_ascii_whitespace();
         while let Some(x) = words.next() {
@@ -109,7 +109,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// The words of a line not yet read.
+/// The unread words of a line.
 struct Words<'a> {
     rest: &'a str,
     number: usize,

@@ -1,4 +1,4 @@
-//! What a PLY file holds, where the caller does not know: Gaussians, Gaussians of a kind that is not drawn, or points.
+//! Content of a PLY file of unknown kind: Gaussians, Gaussians of an unsupported kind, or points.
 
 use super::gaussians::{self, Layout, PlyNotes};
 use super::header::{self, Header};
@@ -10,10 +10,10 @@ use std::path::Path;
 use vg_geometry::Result;
 use vg_splat::Gaussians;
 
-/// What was found in a PLY file.
+/// Content of a PLY file.
 #[derive(Clone, Debug)]
 pub enum Content {
-    /// Gaussians that can be drawn.
+    /// Gaussians that can be rendered.
     Gaussians(Gaussians, PlyNotes),
     /// Gaussians that [`read`](super::read) refuses.
     Others(OtherGaussians),
@@ -21,30 +21,31 @@ pub enum Content {
     Points(ColoredPoints),
 }
 
-/// Gaussians of a kind that is not drawn.
+/// Gaussians of an unsupported kind.
 #[derive(Clone, Debug)]
 pub struct OtherGaussians {
-    /// How many.
+    /// The number of Gaussians.
     pub count: usize,
-    /// What they are, in a few words.
+    /// Name of the kind.
     pub kind: String,
-    /// Why [`read`](super::read) refuses them, with the way out.
+    /// Reason why [`read`](super::read) refuses them, with the way out.
     pub why: String,
-    /// Lowest and highest centre, where there are positions; numbers that are not finite are passed over.
+    /// Lowest and highest centre, if there are positions; numbers that are not finite are ignored.
     pub bounds: Option<([f32; 3], [f32; 3])>,
 }
 
-/// Reads a PLY file, whatever it holds, in one pass: the file may be a pipe.
+/// Reads a PLY file of any content in one pass; the file may be a pipe.
 pub fn read_content(path: &Path) -> Result<Content> {
     let stream = stream::open(path)?;
     let (header, input) = header::open(stream.input, stream.length, path)?;
-    match Layout::of(&header, path) {
+    match Layout::from_header(&header, path) {
         Ok(layout) => {
             gaussians::read_rows(input, &header, &layout, path).map(|(g, n)| Content::Gaussians(g, n))
         }
         Err(error) if holds_splats(&header) => Ok(Content::Others(OtherGaussians {
             count: header.vertices,
-            kind: Variant::of(&header).map_or_else(|| "Gaussians that lack a property".into(), Variant::kind),
+            kind: Variant::from_header(&header)
+                .map_or_else(|| "Gaussians that lack a property".into(), Variant::kind),
             why: error.to_string(),
             bounds: bounds(input, &header, path)?,
         })),

@@ -1,15 +1,16 @@
-//! Formats that people give in place of PLY, told by their first bytes, else by the ending of the name, with the way out.
+//! Detection of other formats given in place of PLY, by their first bytes or else by the file extension, with the way
+//! out.
 
 use std::path::Path;
 use vg_geometry::{Error, Result};
 
-/// Bytes that are enough to tell a format.
+/// The number of bytes that identify a format.
 pub(super) const FIRST_BYTES: usize = 512;
 
-/// How Gaussians become a PLY file.
+/// Way out for Gaussians.
 const GAUSSIANS: &str = "convert it: `splat-transform IN OUT.ply` (npm install -g @playcanvas/splat-transform), or superspl.at/convert";
 
-/// How everything else does.
+/// Way out for everything else.
 const OTHERS: &str = "export Gaussians or a point cloud as PLY from the program that made it";
 
 /// A format that is not read.
@@ -44,7 +45,7 @@ const ZIP: Format = other("a ZIP archive");
 const CHECKPOINT: Format = other("a checkpoint of PyTorch");
 const GZIP: Format = Format { name: "compressed by gzip", way_out: "unpack it first: `gunzip FILE`" };
 
-/// What a file begins with.
+/// Formats by the first bytes of a file.
 const BY_CONTENT: [(&[u8], Format); 10] = [
     (b"NGSP", SPZ),
     (b"glTF", GLB),
@@ -58,7 +59,7 @@ const BY_CONTENT: [(&[u8], Format); 10] = [
     (b"RIFF", PICTURE),
 ];
 
-/// What a name ends in.
+/// Formats by file extension.
 const BY_ENDING: [(&str, Format); 24] = [
     ("spz", SPZ),
     ("sog", SOG),
@@ -86,7 +87,7 @@ const BY_ENDING: [(&str, Format); 24] = [
     ("json", other("JSON")),
 ];
 
-/// An error that names the format of a file which begins with `first` and is no PLY file.
+/// Returns an error that names the format if a file that begins with `first` is not a PLY file.
 pub(super) fn refuse(first: &[u8], path: &Path) -> Result<()> {
     if first.starts_with(b"ply") {
         return Ok(());
@@ -99,12 +100,12 @@ pub(super) fn refuse(first: &[u8], path: &Path) -> Result<()> {
     }
 }
 
-/// An error where the name of a PLY file that is to be written ends like that of another format.
+/// Returns an error if the name of a PLY file to be written has the extension of another format.
 pub(super) fn refuse_name(path: &Path) -> Result<()> {
     match by_ending(path) {
         Some(Format { name, .. }) => {
-            let found = format!("{}, a name of {name}", path.display());
-            Err(Error::argument("path", found, "a name that ends in .ply: a PLY file is written"))
+            let found = format!("{}, the extension of {name}", path.display());
+            Err(Error::argument("path", found, "a name that ends in .ply, since a PLY file is written"))
         }
         None => Ok(()),
     }
@@ -113,7 +114,7 @@ pub(super) fn refuse_name(path: &Path) -> Result<()> {
 fn by_content(first: &[u8], path: &Path) -> Option<Format> {
     let holds = |word: &[u8]| first.windows(word.len()).any(|window| window == word);
     if first.starts_with(b"PK\x03\x04") {
-        // The names of an archive's first files tell what it is for.
+        // The names of an archive's first files identify its format.
         return Some(match () {
             () if holds(b".usd") => USDZ,
             () if holds(b"meta.json") || holds(b".webp") => SOG,
@@ -135,13 +136,13 @@ fn by_ending(path: &Path) -> Option<Format> {
 mod tests {
     use super::*;
 
-    fn said(first: &[u8], name: &str) -> String {
+    fn message(first: &[u8], name: &str) -> String {
         refuse(first, Path::new(name)).err().map_or_else(String::new, |e| e.to_string())
     }
 
     #[test]
-    fn a_format_is_told_by_its_bytes_and_else_by_its_name() {
-        for (first, name, says) in [
+    fn a_format_is_detected_by_its_bytes_and_else_by_its_name() {
+        for (first, name, format) in [
             (&b"\x1f\x8b\x08\x00\x0a"[..], "car.spz", "SPZ"),
             (b"NGSP\x03\x00\x00\x00", "car", "SPZ"),
             (b"PK\x03\x04\x0a\x00\x00\x00meta.json", "car", "SOG"),
@@ -153,15 +154,15 @@ mod tests {
             (b"glTF\x02", "car.ply", "GLB"),
             (b"{\"asset\": {}}", "car.gltf", "glTF"),
         ] {
-            let said = said(first, name);
+            let message = message(first, name);
             assert!(
-                said.contains(says) && said.starts_with(name) && said.contains("; allowed: PLY; "),
-                "{said}"
+                message.contains(format) && message.starts_with(name) && message.contains("; allowed: PLY; "),
+                "{message}"
             );
         }
-        assert!(said(b"\x1f\x8b", "car.ply").contains("gunzip"));
-        assert!(said(b"NGSP", "car.ply").contains("splat-transform"));
-        // What begins as a PLY file is one, whatever it is called.
-        assert_eq!([said(b"ply\n", "car.spz"), said(b"hello", "car.ply")], ["", ""]);
+        assert!(message(b"\x1f\x8b", "car.ply").contains("gunzip"));
+        assert!(message(b"NGSP", "car.ply").contains("splat-transform"));
+        // A file that begins as PLY is one, whatever its name.
+        assert_eq!([message(b"ply\n", "car.spz"), message(b"hello", "car.ply")], ["", ""]);
     }
 }

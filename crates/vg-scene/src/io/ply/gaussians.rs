@@ -1,4 +1,4 @@
-//! Gaussians in the layout of 3DGS's `point_cloud.ply`, which every viewer reads.
+//! Gaussians in the layout of 3DGS's `point_cloud.ply`, which viewers support.
 //!
 //! Binary little-endian floats: `x y z nx ny nz f_dc_0..2 f_rest_* opacity scale_0..2 rot_0..3`, where opacity is
 //! a logit, scales are natural logarithms of metres, rot is (w, x, y, z), and `f_rest` is channel-major: all of
@@ -17,40 +17,40 @@ use vg_splat::Gaussians;
 use vg_splat::gaussians::buffer::{SCALE_RANGE, normalize_quaternion};
 use vg_splat::gaussians::sh;
 
-/// A logit that the logistic function takes to exactly 1 in f32: above ln(2^25), where 1 + exp(-x) rounds to 1.
+/// A logit whose logistic function is exactly 1 in f32: above ln(2^25), where 1 + exp(-x) rounds to 1.
 const LOGIT_OF_ONE: f32 = 20.0;
 
-/// A logit that it takes to exactly 0: below the logarithm of half the smallest f32, -103.97.
+/// A logit whose logistic function is exactly 0 in f32: below the logarithm of half the smallest f32, -103.97.
 const LOGIT_OF_ZERO: f32 = -110.0;
 
-/// What was read beside the Gaussians, and what was changed.
+/// Notes on what was ignored or changed when Gaussians were read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PlyNotes {
-    /// Scales (of three per Gaussian) below the smallest normal f32, raised to it.
+    /// The number of scales (three per Gaussian) below the smallest normal f32, which were raised to it.
     pub clamped_scales: usize,
-    /// Vertex properties that Gaussians do not have, in the file's order; normals are expected and not listed.
+    /// Vertex properties that were ignored, in the file's order, except normals.
     pub ignored: Vec<String>,
 }
 
-/// The Gaussians in a PLY file. Properties may come in any order and of any scalar type, with others between. The file
-/// may be a pipe: it is read once, from front to back. Other formats, and Gaussians of other kinds, are errors that name
+/// Reads the Gaussians in a PLY file. Properties may have any order and any scalar type, with others between. The file
+/// may be a pipe: it is read once, from start to end. Other formats, and Gaussians of other kinds, are errors that name
 /// them and the way out.
 pub fn read(path: &Path) -> Result<(Gaussians, PlyNotes)> {
     let stream = stream::open(path)?;
     read_stream(stream.input, stream.length, path)
 }
 
-/// The same from any source of `length` bytes; `path` is for messages only.
+/// Reads Gaussians from any source of `length` bytes, as [`read`]; `path` is for messages only.
 pub fn read_from(input: impl BufRead, length: u64, path: &Path) -> Result<(Gaussians, PlyNotes)> {
     read_stream(input, Some(length), path)
 }
 
 fn read_stream(input: impl BufRead, length: Option<u64>, path: &Path) -> Result<(Gaussians, PlyNotes)> {
     let (header, input) = header::open(input, length, path)?;
-    read_rows(input, &header, &Layout::of(&header, path)?, path)
+    read_rows(input, &header, &Layout::from_header(&header, path)?, path)
 }
 
-/// The Gaussians that follow a header.
+/// Reads the Gaussians that follow a header.
 pub(super) fn read_rows(
     input: impl BufRead,
     header: &Header,
@@ -72,7 +72,7 @@ pub(super) fn read_rows(
         let mut scale = [0.0; 3];
         for (scale, property) in scale.iter_mut().zip(layout.scale) {
             let log = rows::value(row, property);
-            *scale = scale_of_log(log, &mut notes.clamped_scales)
+            *scale = scale_from_log(log, &mut notes.clamped_scales)
                 .ok_or_else(|| broken(&property.name, format!("{log}; allowed: ln of at most 1e9 m")))?;
         }
         scales.push(scale);
@@ -96,8 +96,8 @@ pub(super) fn read_rows(
     Ok((gaussians, notes))
 }
 
-/// exp of a stored scale. What underflows, minus infinity too, becomes the smallest normal f32 and is counted.
-fn scale_of_log(log: f64, clamped: &mut usize) -> Option<f32> {
+/// exp of a stored scale. Underflow, also of minus infinity, becomes the smallest normal f32 and is counted.
+fn scale_from_log(log: f64, clamped: &mut usize) -> Option<f32> {
     let (smallest, largest) = (*SCALE_RANGE.start(), *SCALE_RANGE.end());
     // The logarithm of the largest scale, rounded to f32, may lie half a step (1e-6) above it.
     if log.is_nan() || log > f64::from(largest).ln() + 2e-6 {
@@ -111,20 +111,20 @@ fn scale_of_log(log: f64, clamped: &mut usize) -> Option<f32> {
     Some(scale.min(largest))
 }
 
-/// Where each part of a Gaussian lies in a row.
+/// The properties of each part of a Gaussian in a row.
 pub(super) struct Layout<'a> {
     mean: [&'a Property; 3],
     scale: [&'a Property; 3],
     rotation: [&'a Property; 4],
     opacity: &'a Property,
     degree: u8,
-    /// In our order, `[(degree + 1)^2][3]`.
+    /// SH coefficients in this library's order, `[(degree + 1)^2][3]`.
     sh: Vec<&'a Property>,
 }
 
 impl<'a> Layout<'a> {
-    pub(super) fn of(header: &'a Header, path: &Path) -> Result<Self> {
-        let variant = Variant::of(header);
+    pub(super) fn from_header(header: &'a Header, path: &Path) -> Result<Self> {
+        let variant = Variant::from_header(header);
         let find = |name: &str| {
             let missing = || {
                 let reason = match variant {
@@ -166,17 +166,17 @@ impl<'a> Layout<'a> {
         })
     }
 
-    /// Names of properties that are neither ours nor normals.
+    /// Names of properties that are neither part of the layout nor normals.
     fn ignored(&self, header: &Header) -> Vec<String> {
         let parts = [&self.mean[..], &self.scale, &self.rotation, &self.sh, &[self.opacity]];
-        let ours = |name: &str| parts.iter().any(|part| part.iter().any(|p| p.name == name));
+        let is_used = |name: &str| parts.iter().any(|part| part.iter().any(|p| p.name == name));
         let names = header.properties.iter().map(|p| &p.name);
-        names.filter(|name| !ours(name) && !["nx", "ny", "nz"].contains(&name.as_str())).cloned().collect()
+        names.filter(|name| !is_used(name) && !["nx", "ny", "nz"].contains(&name.as_str())).cloned().collect()
     }
 }
 
-/// Writes the Gaussians to `path`, replacing what was there only once the file is complete. A name that ends like that
-/// of another format, car.spz, is an error.
+/// Writes the Gaussians to `path`; an existing file is replaced once the new one is complete. The extension of another
+/// format, as in car.spz, is an error.
 pub fn write(path: &Path, gaussians: &Gaussians) -> Result<()> {
     foreign::refuse_name(path)?;
     write_atomically(path, |out| write_to(out, gaussians))
@@ -210,13 +210,13 @@ pub fn write_to(out: &mut dyn Write, gaussians: &Gaussians) -> std::io::Result<(
     Ok(())
 }
 
-/// How long the file of these Gaussians is, bytes.
+/// Size of the file of these Gaussians, bytes.
 pub fn size_of(gaussians: &Gaussians) -> usize {
     let names = property_names(sh::coefficients(gaussians.sh_degree()));
     header_of(gaussians, &names).len() + gaussians.len() * names.len() * 4
 }
 
-/// Properties of a vertex in the order of 3DGS; `coefficients` of each channel's colour.
+/// Properties of a vertex in the order of 3DGS, with `coefficients` per channel of colour.
 fn property_names(coefficients: usize) -> Vec<String> {
     let mut names: Vec<String> = ["x", "y", "z", "nx", "ny", "nz"].map(String::from).into();
     names.extend((0..3).map(|i| format!("f_dc_{i}")));
@@ -233,7 +233,7 @@ fn header_of(gaussians: &Gaussians, names: &[String]) -> String {
     format!("ply\nformat binary_little_endian 1.0\nelement vertex {count}\n{properties}end_header\n")
 }
 
-/// Inverse of the logistic function; exactly 0 and 1 get finite logits that come back as exactly 0 and 1.
+/// Inverse of the logistic function; exactly 0 and 1 give finite logits that are read back as exactly 0 and 1.
 fn logit(opacity: f32) -> f32 {
     if opacity <= 0.0 {
         return LOGIT_OF_ZERO;
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_back_to_the_precision_of_f32_logarithms() {
+    fn written_gaussians_are_read_back_to_the_precision_of_f32_logarithms() {
         for degree in 0..=3 {
             // More than one block of rows.
             let before = sample(degree, 5000);
@@ -310,7 +310,7 @@ mod tests {
         // Half a step of f32 at ln = -87 is 3.8e-6.
         assert!((back.scales()[1][0] / f32::MIN_POSITIVE - 1.0).abs() < 4e-6);
         assert!((back.scales()[0][0] / 1e9 - 1.0).abs() < 2e-6);
-        // A viewer that computes in f32 sees the same.
+        // A viewer that computes in f32 gets the same opacities.
         let sigmoid = |x: f32| 1.0 / (1.0 + (-x).exp());
         assert_eq!((sigmoid(LOGIT_OF_ZERO), sigmoid(LOGIT_OF_ONE)), (0.0, 1.0));
     }
@@ -352,7 +352,7 @@ mod tests {
     ];
 
     #[test]
-    fn properties_may_come_in_any_order_and_type_with_others_between() {
+    fn properties_may_have_any_order_and_type_with_others_between() {
         let (g, notes) = read_bytes(&file(&ONE)).unwrap();
         assert_eq!(g.means(), [[1.0, 2.0, 3.0]]);
         assert_eq!(g.rotations(), [[1.0, 0.0, 0.0, 0.0]]);

@@ -1,23 +1,23 @@
-//! The header of a PLY file: which properties a vertex has, of which type, and where the rows are.
+//! The header of a PLY file: the properties of a vertex, their types, and the position of the rows.
 
 use super::foreign::{self, FIRST_BYTES};
 use std::io::{BufRead, Cursor, Read};
 use std::path::Path;
 use vg_geometry::{Error, Result};
 
-/// Longest header that is read; that of Gaussians of degree 3 takes some 1600 bytes.
+/// Maximum size of a header, bytes; that of Gaussians of degree 3 takes about 1600.
 const MAX_HEADER: u64 = 1 << 20;
 
-/// More properties than any writer's; the search for repeated names is quadratic.
+/// Maximum of properties, more than any writer's; the search for repeated names is quadratic.
 const MAX_PROPERTIES: usize = 1024;
 
-/// Most vertices, so that they can be counted in an i32 everywhere.
+/// Maximum of vertices, so that an i32 can count them everywhere.
 const MAX_VERTICES: u64 = i32::MAX as u64;
 
-/// Vertices that memory is reserved for where the length of the input is unknown.
+/// Maximum of vertices for which memory is reserved if the length of the input is unknown.
 const RESERVED: usize = 1 << 16;
 
-/// Type of a scalar property, by either of its names.
+/// Type of a scalar property.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scalar {
     I8,
@@ -55,7 +55,7 @@ impl Scalar {
     }
 }
 
-/// A scalar property of a vertex and where it lies in a row.
+/// A scalar property of a vertex and its offset in a row.
 #[derive(Clone, Debug)]
 pub(super) struct Property {
     pub(super) name: String,
@@ -63,7 +63,7 @@ pub(super) struct Property {
     pub(super) offset: usize,
 }
 
-/// What the header says of the vertices.
+/// The header's description of the vertices.
 #[derive(Debug)]
 pub(super) struct Header {
     pub(super) vertices: usize,
@@ -71,19 +71,19 @@ pub(super) struct Header {
     pub(super) row_bytes: usize,
     /// Bytes of other elements between the header and the vertices.
     pub(super) skip: u64,
-    /// Vertices to reserve memory for before the first is read: nothing is allocated on a promise.
+    /// The number of vertices to reserve memory for before the first is read, which the header alone must not inflate.
     pub(super) reserve: usize,
 }
 
 impl Header {
-    /// The property called `name`.
+    /// The property named `name`.
     pub(super) fn find(&self, name: &str) -> Option<&Property> {
         self.properties.iter().find(|p| p.name == name)
     }
 }
 
-/// Reads up to and including `end_header`, and returns what follows with it. `length` is the whole file's, where it is
-/// known: the rows that the header promises must fit in it.
+/// Reads up to and including `end_header`; returns the header and the rest of the input. `length` is the whole file's,
+/// if it is known: the rows that the header announces must fit in it.
 pub(super) fn open<R: BufRead>(
     mut input: R,
     length: Option<u64>,
@@ -147,7 +147,7 @@ struct Element {
     row_bytes: usize,
 }
 
-/// The elements up to the vertices, with their properties; what comes after the vertices is never looked at.
+/// Reads the elements up to the vertices, with their properties; elements after the vertices are ignored.
 fn read_elements<R: BufRead>(lines: &mut Lines<R>, path: &Path) -> Result<Vec<Element>> {
     let error = |field: &str, reason: String| Error::format(path, field, reason);
     let mut elements: Vec<Element> = Vec::new();
@@ -212,13 +212,13 @@ struct Lines<R> {
 }
 
 impl<R: BufRead> Lines<R> {
-    /// The next line without its end (LF or CR LF).
+    /// The next line without its line ending (LF or CR LF).
     fn next(&mut self, path: &Path) -> Result<String> {
         let mut line = Vec::new();
         self.input.read_until(b'\n', &mut line).map_err(|e| Error::io(path, e))?;
         self.consumed += line.len() as u64;
         if line.pop() != Some(b'\n') {
-            let reason = "ends before end_header; allowed: a whole header of at most 1 MiB";
+            let reason = "ends before end_header; allowed: a complete header of at most 1 MiB";
             return Err(Error::format(path, "header", reason));
         }
         if line.last() == Some(&b'\r') {

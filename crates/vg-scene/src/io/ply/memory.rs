@@ -1,22 +1,22 @@
-//! The same PLY files in memory: for what is sent over a network, kept in an archive, or made by a test.
+//! PLY files in memory, for networks, archives and tests.
 
 use super::gaussians::{PlyNotes, read_from, size_of, write_to};
 use std::path::Path;
 use vg_geometry::Result;
 use vg_splat::Gaussians;
 
-/// What errors call bytes that have no file.
+/// Name of bytes without a file in errors.
 const NAME: &str = "PLY in memory";
 
-/// The Gaussians in the bytes of a PLY file, as [`read`](super::read) reads them.
+/// Reads the Gaussians in the bytes of a PLY file, as [`read`](super::read).
 pub fn from_bytes(bytes: &[u8]) -> Result<(Gaussians, PlyNotes)> {
     read_from(bytes, bytes.len() as u64, Path::new(NAME))
 }
 
-/// The bytes that [`write`](super::write) puts into a file.
+/// The bytes of the file that [`write`](super::write) writes.
 pub fn to_bytes(gaussians: &Gaussians) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(size_of(gaussians));
-    write_to(&mut bytes, gaussians).expect("a vector takes what it is given");
+    write_to(&mut bytes, gaussians).expect("writing to a vector cannot fail");
     bytes
 }
 
@@ -39,7 +39,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_are_those_of_the_file_as_many_as_were_announced() {
+    fn bytes_equal_those_of_the_file_and_have_the_announced_size() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("m.ply");
         for (degree, n) in [(0, 0), (0, 9), (1, 10), (2, 100), (3, 1001)] {
@@ -53,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_that_end_early_or_are_none_are_an_error_that_says_so() {
+    fn truncated_or_empty_bytes_are_an_error_that_names_them() {
         let bytes = to_bytes(&sample(1, 3));
         for cut in [0, 3, 200, bytes.len() - 1] {
             let error = from_bytes(&bytes[..cut]).unwrap_err().to_string();

@@ -9,23 +9,23 @@ use std::io::{BufRead, Write};
 use std::path::Path;
 use vg_geometry::{Error, Result};
 
-/// Positions and their colours, equally many.
+/// Positions and their colours, in equal numbers.
 pub type ColoredPoints = (Vec<[f32; 3]>, Vec<[u8; 3]>);
 
-/// The point cloud in a PLY file, which may be a pipe; points without colour are mid-grey.
+/// Reads the point cloud in a PLY file, which may be a pipe; points without colour are mid-grey.
 pub fn read_points(path: &Path) -> Result<ColoredPoints> {
     let stream = stream::open(path)?;
     let (header, input) = header::open(stream.input, stream.length, path)?;
     read_rows(input, &header, path)
 }
 
-/// The same from any source of `length` bytes; `path` is for messages only.
+/// Reads a point cloud from any source of `length` bytes, as [`read_points`]; `path` is for messages only.
 pub fn read_points_from(input: impl BufRead, length: u64, path: &Path) -> Result<ColoredPoints> {
     let (header, input) = header::open(input, Some(length), path)?;
     read_rows(input, &header, path)
 }
 
-/// The points that follow a header.
+/// Reads the points that follow a header.
 pub(super) fn read_rows(input: impl BufRead, header: &Header, path: &Path) -> Result<ColoredPoints> {
     let find = |name: &str| {
         let missing = || Error::format(path, format!("property {name}"), "missing; allowed: x y z");
@@ -45,18 +45,18 @@ pub(super) fn read_rows(input: impl BufRead, header: &Header, path: &Path) -> Re
     Ok((positions, colors))
 }
 
-/// Writes a point cloud, replacing what was there only once the file is complete. A name that ends like that of another
-/// format, car.las, is an error.
+/// Writes a point cloud; an existing file is replaced once the new one is complete. The extension of another format, as
+/// in car.las, is an error.
 pub fn write_points(path: &Path, positions: &[[f32; 3]], colors: &[[u8; 3]]) -> Result<()> {
     foreign::refuse_name(path)?;
     if positions.len() != colors.len() {
-        let allowed = format!("{}, one a position", positions.len());
+        let allowed = format!("{}, one for each position", positions.len());
         return Err(Error::argument("colors", colors.len().to_string(), allowed));
     }
     write_atomically(path, |out| write_points_to(out, positions, colors))
 }
 
-/// Writes as many points as there are both positions and colours, a row at a time.
+/// Writes points a row at a time, as many as there are both positions and colours.
 pub fn write_points_to(
     out: &mut dyn Write,
     positions: &[[f32; 3]],

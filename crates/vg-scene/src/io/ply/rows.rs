@@ -8,7 +8,8 @@ use vg_geometry::{Error, Result};
 /// Bytes read at once.
 const BLOCK: usize = 1 << 18;
 
-/// Calls `row` with the number and the bytes of every vertex, in order; the file is never in memory as a whole.
+/// Calls `row` with the number and the bytes of every vertex, in order; only a block of the file is in memory at a
+/// time.
 pub(super) fn for_each(
     mut input: impl BufRead,
     header: &Header,

@@ -1,17 +1,17 @@
-//! Kinds of Gaussians that are not those of 3DGS's layout, told by their properties, and what can be done about them.
+//! Unsupported kinds of Gaussians, detected by their properties, and the ways to convert them.
 
 use super::header::Header;
 
-/// A kind that is not read.
+/// An unsupported kind of Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Variant {
-    /// SuperSplat's layout of 16 bytes a Gaussian, in chunks.
+    /// SuperSplat's layout of 16 bytes per Gaussian, in chunks.
     Packed,
     /// 2D Gaussian splatting: discs of two scales.
     Discs,
-    /// With red, green and blue in place of spherical harmonics.
+    /// Gaussians with red, green and blue in place of spherical harmonics.
     Rgb,
-    /// With more bands of spherical harmonics than are drawn.
+    /// Gaussians with more bands of spherical harmonics than are supported.
     HighDegree(u32),
 }
 
@@ -21,8 +21,8 @@ pub(super) fn holds_splats(header: &Header) -> bool {
 }
 
 impl Variant {
-    /// The kind of Gaussians that lack something of 3DGS's layout; `None` if it is unknown or they are none.
-    pub(super) fn of(header: &Header) -> Option<Self> {
+    /// The kind of Gaussians that differ from 3DGS's layout; `None` if it is unknown or they are no Gaussians.
+    pub(super) fn from_header(header: &Header) -> Option<Self> {
         let has = |name: &str| header.find(name).is_some();
         if !holds_splats(header) {
             return None;
@@ -42,7 +42,7 @@ impl Variant {
             .map(|d| Self::HighDegree(d as u32))
     }
 
-    /// A few words.
+    /// Name of the kind, for messages.
     pub(super) fn kind(self) -> String {
         match self {
             Self::Packed => "compressed PLY, as SuperSplat packs it".into(),
@@ -52,7 +52,7 @@ impl Variant {
         }
     }
 
-    /// What makes 3DGS's layout of them.
+    /// Way to convert them to 3DGS's layout.
     pub(super) fn way_out(self) -> &'static str {
         match self {
             Self::Packed => {
