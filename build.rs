@@ -7,8 +7,8 @@ fn main() {
         "linux" | "android" | "freebsd" | "netbsd" | "openbsd" => {
             // The number of the binary interface.
             println!("cargo::rustc-cdylib-link-arg=-Wl,-soname,libvg.so.0");
-            // A thread that called the library runs the library's destructors of its thread-local memory when it ends,
-            // which may be after dlclose: the code must stay.
+            // When a thread that called the library ends, it runs the library's destructors of thread-local memory, possibly
+            // after dlclose, so the code must stay in memory.
             println!("cargo::rustc-cdylib-link-arg=-Wl,-z,nodelete");
         }
         "macos" => println!("cargo::rustc-cdylib-link-arg=-Wl,-install_name,@rpath/libvg.0.dylib"),

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! The loss is the mean square of colour, alpha and depth, whose gradient takes part of a millisecond. The forward pass
-//! alone stands beside it. Processor time is what can be compared on a busy machine.
+//! alone is printed for comparison. Compare processor time on a busy machine.
 
 use glam::DVec3;
 use std::time::{Duration, Instant};
@@ -40,7 +40,7 @@ fn main() {
     time_losses(&renderer.render(&scenes::surfel_car(20_000), &camera, &RenderOptions::default()).unwrap());
 }
 
-/// Each loss term on its own, in the pool of all processors.
+/// Times each loss term on its own, in a pool of all processors.
 fn time_losses(picture: &Rendered) {
     let target: Vec<[f32; 3]> = picture.color.iter().map(|c| c.map(|v| 0.9 * v + 0.05)).collect();
     let term = Term::weighing(1.0);
@@ -49,7 +49,7 @@ fn time_losses(picture: &Rendered) {
     let terms: [(&str, Loss); 5] = [
         ("l1", &|g| loss::l1(picture, &target, term, g)),
         ("dissimilarity", &|g| loss::dissimilarity(picture, &target, term, g)),
-        ("its target kept", &|g| structure.dissimilarity(picture, 1.0, g)),
+        ("with a structure", &|g| structure.dissimilarity(picture, 1.0, g)),
         ("silhouette", &|g| loss::silhouette(picture, &picture.depth, term, g)),
         ("depth_l1", &|g| loss::depth_l1(picture, &picture.alpha, term, g)),
     ];
@@ -65,10 +65,10 @@ fn time_losses(picture: &Rendered) {
     }
 }
 
-/// A term of one picture, added to a gradient.
+/// A term of the loss of one picture, added to a gradient.
 type Loss<'a> = &'a dyn Fn(&mut PictureGradient) -> vg::Result<f64>;
 
-/// Blobs of 1 to 10 cm through the whole box of a car: many layers per pixel, none of them opaque.
+/// Gaussians of 1 to 10 cm throughout the box of a car: many layers per pixel, none of them opaque.
 fn dense(n: usize) -> Gaussians {
     let g = scenes::random(17, n, 3, [0.01, 0.1]);
     let mut r = Random::new(18);

@@ -1,8 +1,8 @@
-//! What the C boundary costs: `vg_reconstruct` and `vg_render` beside the Rust calls behind them, in turns.
+//! Cost of the C boundary: `vg_reconstruct` and `vg_render` against the Rust calls behind them, in turns.
 //!
 //!     cargo bench --bench boundary [-- ROUNDS]
 
-// The bench is a caller of C functions.
+// The benchmark calls C functions.
 #![allow(unsafe_code)]
 
 use std::ffi::c_void;
@@ -19,7 +19,7 @@ use vg_testing::sample::{self, INPUTS};
 
 const THREADS: u32 = 2;
 
-/// A view as a caller has it: pixels as OpenCV or PIL hand them out, mask bytes, float depth.
+/// A view in a caller's memory: pixels as from OpenCV or PIL, mask bytes, float depth.
 struct Lent {
     pixels: Vec<u8>,
     format: PixelFormat,
@@ -69,7 +69,7 @@ fn reconstruct(with_depth: bool, format: PixelFormat, rounds: usize) -> vg::Resu
         || {
             let made =
                 reconstruct_on(&threads, &scene, &Options::default(), &mut |_| ControlFlow::Continue(()));
-            drop(made.expect("the sample reconstructs"));
+            drop(made.expect("the sample can be reconstructed"));
         },
         || unsafe {
             let (mut car, mut report) = (null_mut(), null_mut());
@@ -140,7 +140,7 @@ fn render(rounds: usize) -> vg::Result<()> {
         rounds * 5,
         || {
             let times = threads.run(|| renderer.render_into(g, &camera, &options, &mut picture));
-            times.expect("the sample draws");
+            times.expect("the sample can be drawn");
             std::hint::black_box(picture.to_rgba8());
         },
         || {
@@ -153,7 +153,7 @@ fn render(rounds: usize) -> vg::Result<()> {
     let size = format!("{} x {} RGBA8", camera.width, camera.height);
     println!("| {size} | {:.2} | {:.2} | {:.4} |", times.rust, times.c, times.ratio);
 
-    println!("\n| context of that picture | ms | beside none named |");
+    println!("\n| context of that picture | ms | ratio to no context |");
     println!("| --- | --- | --- |");
     let draw_in = |context: *mut vg_context| {
         let drawing = vg_render_options { context, ..drawing };
@@ -161,15 +161,15 @@ fn render(rounds: usize) -> vg::Result<()> {
             unsafe { vg_render(car, &raw const from_c, &raw const drawing, &raw const target, null_mut()) };
         assert_eq!(status, vg_status::Ok);
     };
-    let calling = context_of(1);
+    let calling = new_context(1);
     let anew = |threads: u32| {
-        let context = context_of(threads);
+        let context = new_context(threads);
         draw_in(context);
         unsafe { vg_context_free(context) };
     };
     let ways: [(&str, &dyn Fn()); 4] = [
-        ("one of two threads, kept", &|| draw_in(context)),
-        ("the calling thread, kept", &|| draw_in(calling)),
+        ("two threads, reused", &|| draw_in(context)),
+        ("the calling thread, reused", &|| draw_in(calling)),
         ("two threads, made for the call", &|| anew(THREADS)),
         ("the calling thread, made for the call", &|| anew(1)),
     ];
@@ -187,10 +187,10 @@ fn render(rounds: usize) -> vg::Result<()> {
 }
 
 fn context() -> *mut vg_context {
-    context_of(THREADS)
+    new_context(THREADS)
 }
 
-fn context_of(threads: u32) -> *mut vg_context {
+fn new_context(threads: u32) -> *mut vg_context {
     let settings = vg_context_options { struct_size: size_of::<vg_context_options>(), threads, flags: 0 };
     let mut context = null_mut();
     assert_eq!(unsafe { vg_context_new(&raw const settings, &raw mut context, null_mut()) }, vg_status::Ok);
@@ -246,14 +246,14 @@ struct Times {
     ratio: f64,
 }
 
-/// Median times, milliseconds, of two jobs that take turns, and the median of the ratios of neighbours.
+/// Median times, in milliseconds, of two jobs that take turns, and the median of the ratios of consecutive runs.
 fn in_turns(rounds: usize, mut rust: impl FnMut(), mut c: impl FnMut()) -> Times {
     let timed = |job: &mut dyn FnMut()| {
         let start = Instant::now();
         job();
         start.elapsed().as_secs_f64() * 1e3
     };
-    // The first of each also pays for memory.
+    // The first run of each also allocates memory.
     rust();
     c();
     let pairs: Vec<(f64, f64)> = (0..rounds)

@@ -1,8 +1,8 @@
-//! Error against run time: what `--budget` buys, on the bundled sample and on folders with a `split.json`.
+//! Error against run time: results with `--budget`, on the bundled sample and on folders with a `split.json`.
 //!
 //! `cargo bench --bench budget` prints the table of docs/PLAN.md; `-- FOLDER...` adds scenes, or folders of scenes,
-//! `--svg FILE` draws the curve, `--runs N` measures more often. `--stages` prints instead what each stage costs on
-//! one thread, from which the constants of the cost model are taken.
+//! `--svg FILE` draws the curve, `--runs N` sets the number of runs. `--stages` prints the cost of each stage on one
+//! thread instead, from which the constants of the cost model are taken.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -35,7 +35,7 @@ fn main() -> Result<()> {
         return vehicles.iter().try_for_each(stages);
     }
     let threads = Threads::new(THREADS)?;
-    // Weights are read, and the machine is measured, once in a process.
+    // Weights are read, and the machine is measured, once per process.
     run(&threads, &vehicles[0].inputs, &Options { budget_s: Some(10.0), ..Options::default() })?;
     let mut curves = vec![table("sedan", &vehicles[..1], &threads, arguments.runs)?];
     if vehicles.len() > 1 {
@@ -54,7 +54,7 @@ struct Vehicle {
     tests: Scene,
 }
 
-/// PSNR at a time, seconds.
+/// PSNR against time in seconds.
 struct Curve {
     name: String,
     points: Vec<(f64, f64)>,
@@ -142,7 +142,7 @@ impl Row {
     }
 }
 
-/// CPU time of all threads of this process that still live, from Linux's own account of it; elsewhere 0.
+/// CPU time of all living threads of this process, from /proc on Linux; elsewhere 0.
 fn cpu_seconds() -> f64 {
     let Ok(tasks) = std::fs::read_dir("/proc/self/task") else { return 0.0 };
     let nanoseconds = |task: std::fs::DirEntry| -> Option<f64> {
@@ -152,7 +152,7 @@ fn cpu_seconds() -> f64 {
     1e-9 * tasks.flatten().filter_map(nanoseconds).sum::<f64>()
 }
 
-/// Least CPU milliseconds of each part between two reports of progress, on one thread.
+/// Minimum CPU milliseconds of each part between two progress reports, on one thread.
 fn stages(vehicle: &Vehicle) -> Result<()> {
     const RUNS: usize = 3;
     let threads = Threads::new(1)?;
@@ -197,7 +197,7 @@ fn stages(vehicle: &Vehicle) -> Result<()> {
     Ok(())
 }
 
-/// A scene with a split, or a folder of such.
+/// Opens a scene with a split, or a folder of such scenes.
 fn open_all(folder: &Path, vehicles: &mut Vec<Vehicle>) -> Result<()> {
     if folder.join("split.json").is_file() {
         vehicles.push(open(folder)?);
@@ -232,7 +232,7 @@ fn file_error(path: &Path, e: &std::io::Error) -> Error {
     Error::argument(path.display().to_string(), e.to_string(), "a file or folder")
 }
 
-/// PSNR over the logarithm of time.
+/// Plot of PSNR over the logarithm of time.
 fn svg(curves: &[Curve]) -> String {
     const COLORS: [&str; 2] = ["#1f5fa8", "#c4511d"];
     let all = || curves.iter().flat_map(|c| &c.points);
@@ -288,7 +288,7 @@ impl Arguments {
         let mut words = std::env::args().skip(1);
         while let Some(word) = words.next() {
             match word.as_str() {
-                // Cargo's own.
+                // Passed by cargo itself.
                 "--bench" => {}
                 "--stages" => out.stages = true,
                 "--svg" => out.svg = words.next().map(PathBuf::from),

@@ -1,13 +1,13 @@
-//! Time, memory and error of the GPU renderer beside the CPU's, on a car-sized shell of 1 cm surfels:
-//! `cargo bench --no-default-features --features gpu --bench gpu`.
+//! Time, memory and error of the GPU renderer against the CPU renderer, on a car-sized shell of 1 cm surfels:
+//! `cargo bench --features gpu --bench gpu`.
 //!
 //! ```text
 //! cargo bench ... --bench gpu                      20k, 200k, 1M and 4M Gaussians at 512x384 and 1920x1080
 //! cargo bench ... --bench gpu -- 200000            chosen sizes
 //! ```
 //!
-//! `benches/gpu_vs_gsplat` runs it with gsplat's CUDA kernels beside, where there is an NVIDIA GPU. Both draw the same
-//! picture in turns in one run. `WGPU_ADAPTER_NAME` chooses among several adapters.
+//! `benches/gpu_vs_gsplat` runs it together with gsplat's CUDA kernels on a machine with an NVIDIA GPU. Both draw the
+//! same picture in turns in one run. `WGPU_ADAPTER_NAME` chooses among several adapters.
 
 use glam::DVec3;
 use std::process::Command;
@@ -25,8 +25,8 @@ use vg_testing::{compare, scenes};
 /// Gaussians of the scene whose error is measured: 4e9 pixel-Gaussian pairs for the reference.
 const ERROR_GAUSSIANS: usize = 20_000;
 
-/// Of more, refinement is not asked for.
-const MOST_BOTH_WAYS: usize = 1_000_000;
+/// Largest number of Gaussians whose gradients are timed: larger models are not refined.
+const MOST_WITH_GRADIENTS: usize = 1_000_000;
 
 /// Seconds that the pictures of one row may take.
 const BUDGET: Duration = Duration::from_secs(6);
@@ -45,7 +45,7 @@ fn main() {
     drop(GpuRenderer::new(Adapter::Any).unwrap());
     let kind = if gpu.is_software() { "a driver that draws on the CPU" } else { "hardware" };
     println!("{}, {kind}; opened in {:.0} ms, again in {:.0} ms", gpu.name(), ms(cold), ms(start.elapsed()));
-    println!("SH degree 3, {} threads beside it", rayon::current_num_threads());
+    println!("SH degree 3, the CPU with {} threads", rayon::current_num_threads());
     let cpu = CpuRenderer::new();
     print_error(&gpu);
     println!("milliseconds; MiB; mean and largest difference of colour from the CPU's");
@@ -77,10 +77,10 @@ fn main() {
     }
 }
 
-/// One line: a picture of planes, one of bytes, one of several in a call, and one with its gradients, by the device and by
-/// the CPU in turns.
+/// Prints one row: a picture as planes, one as bytes, several in one call, and one with its gradients, by device and
+/// CPU in turns.
 fn row(gpu: &GpuRenderer, cpu: &CpuRenderer, gaussians: &Gaussians, width: u32, height: u32) -> [Camera; 2] {
-    // In turns: of a view that was drawn last the device has the order already.
+    // Views alternate, because the device keeps the depth order of the view it drew last.
     let cameras = [0.75, -0.75].map(|x| looking_at_origin(width, height, DVec3::new(x, -0.55, 0.36), 8.0));
     let options = RenderOptions::default();
     let (asset, uploaded) = timed(|| gpu.upload(gaussians).unwrap_or_else(|e| panic!("{e}")));
@@ -106,7 +106,7 @@ fn row(gpu: &GpuRenderer, cpu: &CpuRenderer, gaussians: &Gaussians, width: u32, 
         };
         let all = || gpu.render_each(&asset, &several, &options, &mut bytes, take).unwrap();
         times[3].push(timed(all).1 / several.len() as u32);
-        if gaussians.len() > MOST_BOTH_WAYS {
+        if gaussians.len() > MOST_WITH_GRADIENTS {
             continue;
         }
         let renderers = [gpu as &dyn Differentiable, cpu];
@@ -144,7 +144,7 @@ fn row(gpu: &GpuRenderer, cpu: &CpuRenderer, gaussians: &Gaussians, width: u32, 
     cameras
 }
 
-/// What `peers/gsplat.py` prints.
+/// Returns the output of `peers/gsplat.py`.
 fn by_gsplat(python: &str, gaussians: &Gaussians, cameras: &[Camera]) -> String {
     let folder = tempfile::tempdir().unwrap();
     let model = folder.path().join("model.ply");
@@ -172,7 +172,7 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
     (made, start.elapsed())
 }
 
-/// Half the mean of the squares of everything a picture is.
+/// Half the mean square of all planes of a picture.
 fn mean_square(p: &Rendered, g: &mut PictureGradient) -> vg::Result<()> {
     let scale = 1.0 / p.alpha.len() as f32;
     g.color.extend(p.color.iter().map(|c| c.map(|v| scale * v)));

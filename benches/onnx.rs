@@ -1,8 +1,9 @@
-//! What a network costs here, beside the same file in Python's ONNX Runtime in the same run; the first call and warm
-//! ones; memory over fifty vehicles.
+//! Cost of a network, compared in one run with the same file in Python's ONNX Runtime: the first call, warm calls, and
+//! memory over fifty vehicles.
 //!
-//! `cargo bench --features onnx --bench onnx -- HEAD.onnx PYTHON`: a Gaussian head (`training/head/export.py` makes one),
-//! and a Python with NumPy and onnxruntime, whose library is used here too. Two threads, the bundled sample's four views.
+//! `cargo bench --features onnx --bench onnx -- HEAD.onnx PYTHON`: a Gaussian head (`training/head/export.py` makes
+//! one), and a Python with NumPy and onnxruntime, whose library is used here too. Two threads, the bundled sample's
+//! four views.
 
 use std::io::{BufRead, BufReader, Write};
 use std::ops::ControlFlow;
@@ -19,7 +20,7 @@ const THREADS: usize = 2;
 const ROUNDS: usize = 9;
 const VEHICLES: usize = 50;
 
-/// Answers each line on standard input with the seconds of one run.
+/// Script that answers each line on standard input with the seconds of one run.
 const PYTHON: &str = r#"
 import sys, time, numpy as np, onnxruntime as ort
 options = ort.SessionOptions()
@@ -124,7 +125,7 @@ fn ours(model: &Model) -> Result<f64> {
     Ok(start.elapsed().as_secs_f64())
 }
 
-/// Memory now and at most, from Linux's own account.
+/// Current and peak memory, from /proc on Linux.
 fn resident() -> String {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let kib = |name: &str| {

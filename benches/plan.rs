@@ -1,5 +1,5 @@
-//! What each omission of the plan is worth: dB on the unseen side, time and Gaussians, with it and without it, on
-//! a scene made from the bundled sample in which it fires. `cargo bench --bench plan` prints the table of
+//! Value of each omission of the plan: dB on the unseen side, time and Gaussians, with it and without it, on
+//! a scene derived from the bundled sample in which it occurs. `cargo bench --bench plan` prints the table of
 //! docs/PLAN.md.
 
 use vg::pipeline::{Keep, Options, PriorChoice};
@@ -110,7 +110,7 @@ fn row(
 ) -> Result<()> {
     let first = run(scene, &options[0])?;
     let count: usize = first.report.left_out.iter().filter(|l| l.why.contains(why)).map(|l| l.count).sum();
-    assert!(count > 0, "{what} does not fire on {scene_name}");
+    assert!(count > 0, "{what}: no omission on {scene_name}");
     let mut cells = [(0.0, 0.0, 0); 2];
     for (cell, options) in cells.iter_mut().zip(options) {
         let made = run(scene, options)?;

@@ -1,7 +1,7 @@
-//! Time of a reconstruction, stage by stage, with its error on the unseen side beside it, on the bundled sample.
+//! Time of a reconstruction, stage by stage, and its error on the unseen side, on the bundled sample.
 //!
 //! `cargo bench --bench reconstruct` prints one row per depth source and number of threads: medians over the runs,
-//! what part of the whole the cloning takes, and the highest memory of the process during these runs.
+//! the share of the cloning in the total time, and the peak memory of the process during these runs.
 
 use vg::pipeline::{Options, PriorChoice, Report};
 use vg::symmetry::SymmetryMode;
@@ -51,7 +51,7 @@ fn row(scene: &Scene, tests: &Scene, options: &Options) -> Result<()> {
     );
     let cells: Vec<String> = stages.iter().map(|(name, ms)| format!("{name} {ms:.1}")).collect();
     println!("  {}", cells.join(", "));
-    // The check draws the model into its input views, which a caller need not wait for to have the model.
+    // The check draws the model into its input views; a caller does not need it to get the model.
     let cloning = of("symmetry");
     println!(
         "  cloning takes {:.1} % of the whole, {:.1} % without the check\n",
@@ -61,7 +61,7 @@ fn row(scene: &Scene, tests: &Scene, options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// Linux forgets the highest memory so far when asked; elsewhere the rows show the highest of all so far.
+/// Resets the peak memory on Linux; elsewhere each row shows the peak since the start.
 fn forget_peak_memory() {
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }

@@ -1,21 +1,22 @@
-//! Time of a step of refinement, beside OpenSplat's CPU renderer in the same run.
+//! Time of a step of refinement, compared with OpenSplat's CPU renderer in the same run.
 //!
 //! ```text
 //! cargo bench --bench refine                                              the library alone
 //! cargo bench --bench refine -- --opensplat CHECKOUT --python PYTHON      both, in turns
 //! ```
 //!
-//! CHECKOUT is one of OpenSplat's repository (AGPL; nothing of it is here), PYTHON one with PyTorch, NumPy and ninja,
-//! and a C++ compiler is needed: the first run builds an extension, which takes minutes.
+//! CHECKOUT is a clone of OpenSplat's repository (AGPL; none of its code is here), PYTHON an interpreter with PyTorch,
+//! NumPy and ninja. A C++ compiler is needed: the first run builds an extension, which takes minutes.
 //!
-//! Both have the same Gaussians, cameras, targets and loss (0.8 L1 + 0.2 (1 - SSIM) of colour on black, without the five
-//! pixels at the rim), the same rates of Adam, and two threads. A step is what both do: draw one view, take the
-//! gradient of every parameter, move every parameter by Adam. The library's own steps have two more terms of loss and
-//! exposures; OpenSplat's keep gradients of splat centres, and move SH bands above 0 once in 16 steps.
+//! Both have the same Gaussians, cameras, targets and loss (0.8 L1 + 0.2 (1 - SSIM) of colour on black, without the
+//! five pixels at the border), the same Adam rates, and two threads. A step contains what both do: draw one view,
+//! compute the gradient of every parameter, update every parameter by Adam. The library's own steps also have two more
+//! loss terms and exposures; those of OpenSplat also keep gradients of splat centres, and update SH bands above 0 once
+//! in 16 steps.
 
-#[allow(dead_code, unused_imports)] // of density control and of its tests, which are not here
+#[allow(dead_code, unused_imports)] // used by density control and its tests, which are not compiled here
 #[path = "../crates/vehicle-gaussians/src/refine/adam.rs"]
-mod adam; // what the library itself moves parameters by
+mod adam; // the optimiser of the library
 
 use adam::Adam;
 use glam::DVec3;
@@ -36,44 +37,44 @@ const GAUSSIANS: usize = 100_000;
 const SIZE: [u32; 2] = [512, 384];
 const THREADS: usize = 2;
 const BLOCKS: usize = 3;
-/// Of each block and kind of work, one step by each view.
+/// Rounds per block and kind of work; a round is one step for each view.
 const ROUNDS: usize = 3;
-/// Weight of 1 - SSIM beside that of L1; the other program has it as well.
+/// Weight of 1 - SSIM against that of L1, as in OpenSplat.
 const SSIM: f64 = 0.2;
 /// Adam's epsilon.
 const NOISE: f32 = 1e-9;
 /// OpenSplat's loss leaves out the pixels whose SSIM window is cut.
 const RIM: u32 = 5;
 
-/// What is timed.
+/// The work that is timed.
 #[derive(Clone, Copy)]
 enum Work {
     /// A picture, its loss, and all gradients.
     Gradients,
-    /// And a step; the other program's is by the optimiser that OpenSplat uses.
+    /// `Gradients`, and a step; OpenSplat with its own optimiser.
     Step,
-    /// The same, by the fastest optimiser of the other program.
+    /// `Step`, with the fastest optimiser of libtorch for OpenSplat.
     FusedStep,
 }
 
 fn main() -> Result<()> {
     let words: Vec<String> = std::env::args().skip(1).filter(|w| w != "--bench").collect();
     let after = |name: &str| words.iter().position(|w| w == name).and_then(|i| words.get(i + 1));
-    let mut ours = Ours::new()?;
+    let mut library = Library::new()?;
     let folder = tempfile::tempdir().expect("a folder");
-    let mut theirs = match (after("--opensplat"), after("--python")) {
-        (Some(checkout), Some(python)) => Some(Theirs::start(python, checkout, folder.path(), &ours)?),
+    let mut opensplat = match (after("--opensplat"), after("--python")) {
+        (Some(checkout), Some(python)) => Some(OpenSplat::start(python, checkout, folder.path(), &library)?),
         _ => None,
     };
     println!(
         "{GAUSSIANS} Gaussians, SH degree 3, {} views of {}x{}, {THREADS} threads each, {}",
-        ours.cameras.len(),
+        library.cameras.len(),
         SIZE[0],
         SIZE[1],
-        ours.renderer.level()
+        library.renderer.level()
     );
-    if let Some(theirs) = &mut theirs {
-        compare(&mut ours, theirs, folder.path())?;
+    if let Some(opensplat) = &mut opensplat {
+        compare(&mut library, opensplat, folder.path())?;
     }
 
     println!(
@@ -86,11 +87,11 @@ fn main() -> Result<()> {
         ("a step, its optimiser", Work::Step),
         ("a step, libtorch's fused Adam", Work::FusedStep),
     ];
-    // A block of each in turn, so that what else the machine does meets all of them.
+    // Blocks alternate, so that other load on the machine affects all of them.
     let mut times = vec![(Vec::new(), Vec::new()); all.len()];
     for _ in 0..BLOCKS {
         for ((_, work), (here, there)) in all.iter().zip(&mut times) {
-            block(*work, &mut ours, theirs.as_mut(), here, there)?;
+            block(*work, &mut library, opensplat.as_mut(), here, there)?;
         }
     }
     for ((name, _), (here, there)) in all.iter().zip(&times) {
@@ -109,35 +110,35 @@ fn main() -> Result<()> {
             middle(&ratios, 1)
         );
     }
-    let share = |d: Duration| 1e3 * d.as_secs_f64() / f64::from(ours.drawn);
-    println!("\nvg's loss and its gradient are {:.1} ms of each", share(ours.in_loss));
+    let share = |d: Duration| 1e3 * d.as_secs_f64() / f64::from(library.drawn);
+    println!("\nvg's loss and its gradient take {:.1} ms of each", share(library.in_loss));
     Ok(())
 }
 
-/// Rounds in turns, after one of each that is not timed; adds wall and processor ms of one view.
+/// Runs rounds in turns, after one of each that is not timed; adds wall and processor ms of one view.
 fn block(
     work: Work,
-    ours: &mut Ours,
-    mut theirs: Option<&mut Theirs>,
+    library: &mut Library,
+    mut opensplat: Option<&mut OpenSplat>,
     here: &mut Vec<[f64; 2]>,
     there: &mut Vec<[f64; 2]>,
 ) -> Result<()> {
-    /// A thread that spins before it sleeps is not to take the other program's time.
+    /// Time to wait so that a thread that spins before it sleeps takes no time from the other program.
     const PAUSE: Duration = Duration::from_millis(50);
-    ours.reset();
-    if let Some(theirs) = &mut theirs {
-        theirs.ask("reset")?;
+    library.reset();
+    if let Some(opensplat) = &mut opensplat {
+        opensplat.ask("reset")?;
     }
-    let per_view = 1e3 / ours.cameras.len() as f64;
+    let per_view = 1e3 / library.cameras.len() as f64;
     for round in 0..=ROUNDS {
         std::thread::sleep(PAUSE);
-        let row = ours.round(work)?;
+        let row = library.round(work)?;
         if round > 0 {
             here.push(row.map(|s| s * per_view));
         }
         std::thread::sleep(PAUSE);
-        let Some(theirs) = &mut theirs else { continue };
-        let row = theirs.ask(match work {
+        let Some(opensplat) = &mut opensplat else { continue };
+        let row = opensplat.ask(match work {
             Work::Gradients => "gradients",
             Work::Step => "step",
             Work::FusedStep => "fused_step",
@@ -149,26 +150,26 @@ fn block(
     Ok(())
 }
 
-/// How far the two pictures of the first view and their gradients of means are from one another.
-fn compare(ours: &mut Ours, theirs: &mut Theirs, folder: &Path) -> Result<()> {
-    let [loss, _] = theirs.ask("look")?;
+/// Prints the differences of the two pictures of the first view and of their gradients of means.
+fn compare(library: &mut Library, opensplat: &mut OpenSplat, folder: &Path) -> Result<()> {
+    let [loss, _] = opensplat.ask("look")?;
     let numbers = |name: &str| -> Vec<f32> {
         let bytes = read(folder.join(name)).expect("what was written");
         bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().expect("four"))).collect()
     };
-    let here = ours.descend(0)?;
+    let here = library.descend(0)?;
     let picture = numbers("picture.f32");
-    let colors = ours.picture.color.as_flattened().iter().zip(&picture);
+    let colors = library.picture.color.as_flattened().iter().zip(&picture);
     let off = vg_testing::difference(colors.map(|(a, b)| (a.min(1.0).into(), (*b).into())));
     println!("loss {here:.6} and {loss:.6}; pictures differ by {:.1e}, at most {:.1e}", off.mean, off.max);
     let apart = |name: &str| {
         let there = numbers(name);
-        let pairs = ours.gradients.means.as_flattened().iter().zip(&there);
+        let pairs = library.gradients.means.as_flattened().iter().zip(&there);
         let off: f64 = pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum();
         (off / there.iter().map(|b| f64::from(*b).powi(2)).sum::<f64>()).sqrt()
     };
     println!(
-        "gradients of means differ by {:.1e} of their norm; by {:.1e} where OpenSplat's colour turns with its centre\n",
+        "gradients of means differ by {:.1e} of their norm; by {:.1e} if OpenSplat's colour depends on its centre\n",
         apart("means.f32"),
         apart("means_turning.f32")
     );
@@ -176,7 +177,7 @@ fn compare(ours: &mut Ours, theirs: &mut Theirs, folder: &Path) -> Result<()> {
 }
 
 /// The library's side.
-struct Ours {
+struct Library {
     pool: rayon::ThreadPool,
     renderer: CpuRenderer,
     options: RenderOptions,
@@ -184,12 +185,12 @@ struct Ours {
     cameras: Vec<Camera>,
     /// `[view][height * width]`
     targets: Vec<Vec<[f32; 3]>>,
-    /// The same for SSIM.
+    /// Data of the target for SSIM, per view.
     structures: Vec<Structure>,
-    /// 1 where the loss looks, 0 at the rim. `[height * width]`
+    /// 1 inside, 0 at the border that the loss ignores. `[height * width]`
     inside: Vec<f32>,
     start: Gaussians,
-    // Written by steps.
+    // Written by the steps.
     gaussians: Gaussians,
     parameters: Parameters,
     picture: Rendered,
@@ -199,7 +200,7 @@ struct Ours {
     drawn: u32,
 }
 
-impl Ours {
+impl Library {
     fn new() -> Result<Self> {
         let start = scenes::surfel_car(GAUSSIANS);
         // OpenSplat's constants.
@@ -228,14 +229,14 @@ impl Ours {
             pool: rayon::ThreadPoolBuilder::new().num_threads(THREADS).build().expect("threads"),
             renderer,
             options,
-            // Of centres in metres.
+            // The rate of centres is in metres.
             rates: Rates { means: rates.means * radius_m(&start), ..rates },
             cameras,
             structures: structures.collect::<Result<_>>()?,
             targets,
             inside,
             gaussians: start.clone(),
-            parameters: Parameters::of(&start),
+            parameters: Parameters::new(&start),
             start,
             picture: Rendered::default(),
             of_picture: PictureGradient::default(),
@@ -247,7 +248,7 @@ impl Ours {
 
     fn reset(&mut self) {
         self.gaussians = self.start.clone();
-        self.parameters = Parameters::of(&self.start);
+        self.parameters = Parameters::new(&self.start);
     }
 
     /// Wall and processor seconds of one step by each view.
@@ -266,7 +267,7 @@ impl Ours {
         Ok([wall.elapsed().as_secs_f64(), (cpu_time() - cpu).as_secs_f64()])
     }
 
-    /// A picture, and the gradients of its loss, which it returns.
+    /// Draws a picture and computes the gradients of its loss. Returns the loss.
     fn descend(&mut self, view: usize) -> Result<f64> {
         let Self { pool, renderer, gaussians, options, cameras, targets, structures, inside, .. } = self;
         let results = (&mut self.picture, &mut self.of_picture, &mut self.gradients);
@@ -291,7 +292,7 @@ fn radius_m(gaussians: &Gaussians) -> f32 {
     0.5 * (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f32>().sqrt()
 }
 
-/// The same vehicle, a little different everywhere: what the photographs show.
+/// The vehicle with small changes everywhere, as the target of the photographs.
 fn perturbed(g: &Gaussians) -> Gaussians {
     let mut r = Random::new(5);
     let mut by = |v: f32, sigma: f64| v + (sigma * r.normal()) as f32;
@@ -306,7 +307,7 @@ fn perturbed(g: &Gaussians) -> Gaussians {
     .expect("storable")
 }
 
-/// What Adam moves, each in the space in which it may have any value.
+/// Parameters of Adam, each in a space without bounds.
 struct Parameters {
     sh_degree: u8,
     means: Vec<[f32; 3]>,
@@ -314,13 +315,13 @@ struct Parameters {
     log_scales: Vec<[f32; 3]>,
     logits: Vec<f32>,
     sh: Vec<f32>,
-    /// Of means, rotations, scales, opacities and colours.
+    /// Moments for means, rotations, scales, opacities and colours.
     adams: [Adam; 5],
     gradient: Vec<f32>,
 }
 
 impl Parameters {
-    fn of(g: &Gaussians) -> Self {
+    fn new(g: &Gaussians) -> Self {
         let n = g.len();
         Self {
             sh_degree: g.sh_degree(),
@@ -334,26 +335,30 @@ impl Parameters {
         }
     }
 
-    fn step(&mut self, of: &Gradients, rates: &Rates) {
+    fn step(&mut self, gradients: &Gradients, rates: &Rates) {
         let [means, rotations, scales, opacities, sh] = &mut self.adams;
-        means.step(self.means.as_flattened_mut(), of.means.as_flattened(), &[rates.means]);
-        rotations.step(self.rotations.as_flattened_mut(), of.rotations.as_flattened(), &[rates.rotations]);
+        means.step(self.means.as_flattened_mut(), gradients.means.as_flattened(), &[rates.means]);
+        rotations.step(
+            self.rotations.as_flattened_mut(),
+            gradients.rotations.as_flattened(),
+            &[rates.rotations],
+        );
         let log_scales = self.log_scales.as_flattened_mut();
-        let of_log = |(s, g): (&f32, &f32)| s.exp() * g;
+        let in_log = |(s, g): (&f32, &f32)| s.exp() * g;
         self.gradient.clear();
-        self.gradient.par_extend(log_scales.par_iter().zip(of.scales.as_flattened()).map(of_log));
+        self.gradient.par_extend(log_scales.par_iter().zip(gradients.scales.as_flattened()).map(in_log));
         scales.step(log_scales, &self.gradient, &[rates.scales]);
-        let of_logit = |(x, g): (&f32, &f32)| sigmoid(*x) * sigmoid(-x) * g;
+        let in_logit = |(x, g): (&f32, &f32)| sigmoid(*x) * sigmoid(-x) * g;
         self.gradient.clear();
-        self.gradient.par_extend(self.logits.par_iter().zip(&of.opacities).map(of_logit));
+        self.gradient.par_extend(self.logits.par_iter().zip(&gradients.opacities).map(in_logit));
         opacities.step(&mut self.logits, &self.gradient, &[rates.opacities]);
         let stride = self.sh.len() / self.logits.len();
         let rate = |k: usize| if k < 3 { rates.colors } else { rates.view_dependence };
-        sh.step(&mut self.sh, &of.sh, &(0..stride).map(rate).collect::<Vec<f32>>());
+        sh.step(&mut self.sh, &gradients.sh, &(0..stride).map(rate).collect::<Vec<f32>>());
     }
 
-    /// Through the door that checks every number; the library's own refinement, which keeps what it checks, writes over
-    /// the Gaussians of the step before.
+    /// Makes Gaussians through the constructor that checks every number; the library's own refinement overwrites the
+    /// Gaussians of the previous step instead.
     fn made(&self) -> Result<Gaussians> {
         Gaussians::from_arrays(
             self.sh_degree,
@@ -370,15 +375,15 @@ fn sigmoid(x: f32) -> f32 {
     1.0 / (1.0 + (-x).exp())
 }
 
-/// The other program, which answers a line with a line.
-struct Theirs {
+/// The process of OpenSplat, which answers each line with a line.
+struct OpenSplat {
     child: Child,
     ask: Option<ChildStdin>,
     answers: BufReader<ChildStdout>,
 }
 
-impl Theirs {
-    fn start(python: &str, checkout: &str, folder: &Path, ours: &Ours) -> Result<Self> {
+impl OpenSplat {
+    fn start(python: &str, checkout: &str, folder: &Path, library: &Library) -> Result<Self> {
         let camera_from_vehicle = |camera: &Camera| {
             let m = camera.vehicle_from_camera.inverse().to_row_major();
             [&m[..4], &m[4..8], &m[8..], &[0.0, 0.0, 0.0, 1.0]].map(<[f64]>::to_vec)
@@ -387,17 +392,17 @@ impl Theirs {
             let k = camera.intrinsics;
             [k.fx, k.fy, k.cx, k.cy]
         };
-        let Rates { means, rotations, scales, opacities, colors, view_dependence, .. } = ours.rates;
+        let Rates { means, rotations, scales, opacities, colors, view_dependence, .. } = library.rates;
         let job = serde_json::json!({
             "size": SIZE,
-            "cameras": ours.cameras.iter().map(camera_from_vehicle).collect::<Vec<_>>(),
-            "intrinsics": ours.cameras.iter().map(intrinsics).collect::<Vec<_>>(),
+            "cameras": library.cameras.iter().map(camera_from_vehicle).collect::<Vec<_>>(),
+            "intrinsics": library.cameras.iter().map(intrinsics).collect::<Vec<_>>(),
             "rates": [means, scales, rotations, opacities, colors, view_dependence],
             "noise": NOISE,
         });
         let targets: Vec<u8> =
-            ours.targets.iter().flat_map(|t| t.as_flattened()).flat_map(|v| v.to_le_bytes()).collect();
-        io::ply::write(&folder.join("start.ply"), &ours.start)?;
+            library.targets.iter().flat_map(|t| t.as_flattened()).flat_map(|v| v.to_le_bytes()).collect();
+        io::ply::write(&folder.join("start.ply"), &library.start)?;
         write(folder.join("job.json"), job.to_string()).expect("a file");
         write(folder.join("targets.f32"), targets).expect("a file");
         let program = vg_testing::root().join("benches/peers/opensplat.py");
@@ -414,7 +419,7 @@ impl Theirs {
         Ok(Self { child, ask, answers })
     }
 
-    /// The two numbers it answers.
+    /// Returns the two numbers of its answer.
     fn ask(&mut self, word: &str) -> Result<[f64; 2]> {
         let mut line = String::new();
         let ask = self.ask.as_mut().expect("a pipe");
@@ -424,9 +429,9 @@ impl Theirs {
     }
 }
 
-impl Drop for Theirs {
+impl Drop for OpenSplat {
     fn drop(&mut self) {
-        // The end of its input is the end of it.
+        // Closing its input ends it.
         self.ask = None;
         let _ = self.child.wait();
     }

@@ -6,8 +6,8 @@
 //! cargo bench --bench render -- --portable          without AVX2
 //! ```
 //!
-//! Wall time is what a user waits for, processor time is what can be compared on a busy machine. The error of
-//! the same code against the f64 reference, on a scene small enough for brute force, stands beside them.
+//! Wall time is what a user waits for; compare processor time on a busy machine. The error of the same code against the
+//! f64 reference, on a scene small enough for brute force, is printed too.
 
 use glam::DVec3;
 use std::time::{Duration, Instant};

@@ -1,9 +1,10 @@
-//! What inexact input costs, and what the calibration gives back: errors on the unseen side when the input views'
-//! cameras, the plane of symmetry or masks are wrong by known amounts, and with fewer and more views.
+//! Cost of inexact input, and the gain of the calibration: errors on the unseen side if the input views' cameras, the
+//! plane of symmetry or masks are wrong by known amounts, and with fewer and more views.
 //!
-//! `cargo bench --bench robustness` takes the bundled sample. `-- FOLDER` takes the vehicles in a folder, each a scene
-//! with a `split.json` of one or more keys; `--only NAME,NAME` some of them, `--prior NAME,NAME` other priors than the
-//! hull, `--case TEXT` the rows with TEXT in their name. Prints a Markdown table per prior: PSNR in dB / silhouette IoU / mean absolute depth error in m.
+//! `cargo bench --bench robustness` uses the bundled sample. `-- FOLDER` uses the vehicles in a folder, each a scene
+//! with a `split.json` of one or more keys; `--only NAME,NAME` selects vehicles, `--prior NAME,NAME` other priors than
+//! the hull, `--case TEXT` the rows with TEXT in their name. Prints a Markdown table per prior: PSNR in dB / silhouette
+//! IoU / mean absolute depth error in m.
 
 use glam::{DMat3, DQuat, DVec3};
 use std::collections::BTreeMap;
@@ -34,11 +35,11 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// What is done to the input.
+/// A change of the input.
 #[derive(Clone, Copy, Debug)]
 enum Case {
     AsGiven,
-    /// Each camera on its own: rotated by 0.3 degrees and moved by 3 cm about each axis (one sigma).
+    /// Each camera independently: rotated by 0.3 degrees and moved by 3 cm about each axis (one sigma).
     Jittered,
     /// All cameras, those of the test views too: yawed by 2 degrees and shifted by 5 cm.
     PlaneMoved,
@@ -50,9 +51,9 @@ enum Case {
     HalfOccluded,
     /// Half a mask and a moved plane.
     HalfOccludedPlaneMoved,
-    /// So many views.
+    /// A number of views.
     Views(usize),
-    /// So many views with the plane moved.
+    /// A number of views, with the plane moved.
     ViewsPlaneMoved(usize),
 }
 
@@ -92,7 +93,7 @@ impl Case {
         }
     }
 
-    /// How many input views; 4 is what the splits have.
+    /// Number of input views; the splits have 4.
     fn views(self) -> usize {
         match self {
             Self::Views(n) | Self::ViewsPlaneMoved(n) => n,
@@ -134,7 +135,7 @@ fn jitter(random: &mut Random, scene: &mut Scene) {
     }
 }
 
-/// To either side, by the seed.
+/// Moves the plane to either side, chosen by the seed.
 fn move_plane(random: &mut Random, scenes: [&mut Scene; 2]) {
     let mut side = || if random.bits() & 1 == 0 { 1.0 } else { -1.0 };
     let rotation = DMat3::from_rotation_z(side() * 2f64.to_radians());
@@ -188,7 +189,7 @@ impl Vehicle {
         let bytes = std::fs::read(&path).map_err(|e| broken(e.to_string()))?;
         let mut splits: BTreeMap<String, BTreeMap<String, Vec<String>>> =
             serde_json::from_slice(&bytes).map_err(|e| broken(e.to_string()))?;
-        // As everywhere in the tables: the right side is shown where both directions are there.
+        // As in all tables, the right side is the input if both directions exist.
         let key = if splits.contains_key("right_to_left") {
             "right_to_left".into()
         } else {
@@ -205,8 +206,8 @@ impl Vehicle {
         open_scene(&self.folder, &options).map(|s| s.scene)
     }
 
-    /// Names of `count` input views: of the split's, those nearest to the middle of the list, and beyond them other
-    /// views of the same side that are no test views.
+    /// Names of `count` input views: those of the split nearest to the middle of the list, and beyond them other views
+    /// of the same side that are no test views.
     fn inputs(&self, count: usize) -> Result<Vec<String>> {
         let n = self.input.len();
         if count <= n {
@@ -227,7 +228,7 @@ impl Vehicle {
     }
 }
 
-/// Names of views are file names, with or without their folder.
+/// Whether two names of views are equal. Names are file names, with or without their folder.
 fn same(a: &str, b: &str) -> bool {
     Path::new(a).file_stem() == Path::new(b).file_stem()
 }
@@ -299,7 +300,7 @@ impl Arguments {
                 arguments.next().unwrap_or_default().split(',').map(Into::into).collect()
             };
             match argument.as_str() {
-                // What cargo itself passes.
+                // Passed by cargo itself.
                 "--bench" => {}
                 "--only" => read.only = list(),
                 "--case" => read.case = list().join(","),
@@ -325,7 +326,7 @@ impl Arguments {
     }
 }
 
-/// By the name it has in reports.
+/// The prior with this name in reports.
 fn prior(name: &str) -> Result<PriorChoice> {
     serde_json::from_value(serde_json::Value::String(name.into()))
         .map_err(|_| Error::argument("--prior", name.to_owned(), "the name of a prior"))

@@ -1,8 +1,8 @@
-//! How far reconstructed surfaces are from scans, and how long it takes to tell.
+//! Distances of reconstructed surfaces from scans, and the time to compute them.
 //!
-//! `cargo bench --bench surface -- FOLDER` takes the vehicles in a folder: each a `transforms.json`, a `split.json` of
-//! keys with `input` views, and a scan in metres in the vehicle's frame, `pcd.ply`. Reconstructs each with the default
-//! options on two threads and prints a Markdown table, a row per vehicle with the mean over its splits.
+//! `cargo bench --bench surface -- FOLDER` uses the vehicles in a folder: each has a `transforms.json`, a `split.json`
+//! with `input` views, and a scan in metres in the vehicle's frame, `pcd.ply`. Reconstructs each with the default
+//! options on two threads and prints a Markdown table, one row per vehicle with the mean over its splits.
 
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -22,7 +22,7 @@ struct Split {
 
 type Measure = fn(&SurfaceErrors) -> f64;
 
-/// Columns, and where their numbers come from.
+/// Columns, and the source of their numbers.
 const COLUMNS: [(&str, Measure); 9] = [
     ("accuracy m", |e| e.accuracy_m),
     ("completeness m", |e| e.completeness_m),
@@ -62,7 +62,7 @@ fn vehicles(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// The errors of each split, and the milliseconds of telling.
+/// The errors of each split, and the milliseconds to compute them.
 fn measured(vehicle: &Path, threads: &Threads) -> Result<Vec<(SurfaceErrors, f64)>> {
     let path = vehicle.join("split.json");
     let text = std::fs::read(&path).map_err(|e| Error::io(&path, e))?;

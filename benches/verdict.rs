@@ -1,12 +1,12 @@
-//! How the verdict judges good input and bad: each scene is reconstructed as it is, with the faults of ordinary
-//! captures, and with mistakes that make the result worthless.
+//! Verdicts on good and bad input: each scene is reconstructed unchanged, with the faults of ordinary captures, and
+//! with mistakes that make the result worthless.
 //!
-//! `cargo bench --bench verdict` takes the bundled sample. `-- FOLDER ...` takes scenes, or folders of scenes, each with
-//! a `split.json`; all keys of each are used. `--only NAME,NAME` takes some of the scenes, `--case TEXT` the rows with
-//! TEXT in their name, `--depth no|yes|both` runs without the scene's depth, with it, or both (default). Prints a Markdown
-//! table: how many were called good, doubtful, bad, and how many refused with an error; the most frequent reasons;
-//! PSNR on the unseen side. `--figures FILE` writes all evidence, a JSON object a line. Exit code 1 if a good scene is called bad, or a
-//! bad one good.
+//! `cargo bench --bench verdict` uses the bundled sample. `-- FOLDER ...` uses scenes, or folders of scenes, each with
+//! a `split.json`; all keys of each are used. `--only NAME,NAME` selects scenes, `--case TEXT` the rows with TEXT in
+//! their name, `--depth no|yes|both` runs without the scene's depth, with it, or both (default). Prints a Markdown table: the
+//! numbers of good, doubtful and bad verdicts and of errors (refused); the most frequent reasons; PSNR on the unseen
+//! side. `--figures FILE` writes all evidence, one JSON object per line. Exit code 1 if a good scene gets the verdict
+//! bad, or a bad one good.
 
 use glam::{DMat3, DQuat, DVec3};
 use std::collections::BTreeMap;
@@ -36,7 +36,7 @@ fn main() -> Result<ExitCode> {
             }
         }
     }
-    println!("\n{wrong} verdicts are not what was expected");
+    println!("\nunexpected verdicts: {wrong}");
     Ok(if wrong == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
@@ -47,22 +47,22 @@ struct Case {
     expected: Expected,
 }
 
-/// What the verdict must be.
+/// The expected verdict.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Expected {
     /// Not bad.
     Good,
     /// Not good; or an error.
     Bad,
-    /// Anything: the input does not tell.
+    /// Any verdict: the input does not determine it.
     Open,
 }
 
-/// What is done to the input.
+/// A change of the input.
 #[derive(Clone, Copy, Debug)]
 enum Fault {
     None,
-    /// Each camera on its own: rotated by 0.3 degrees and moved by 3 cm about each axis (one sigma).
+    /// Each camera independently: rotated by 0.3 degrees and moved by 3 cm about each axis (one sigma).
     Jitter,
     /// The plane of symmetry is yawed by 2 degrees and shifted by 5 cm.
     PlaneTurned,
@@ -72,23 +72,23 @@ enum Fault {
     Dilated(u32),
     /// One mask, from its middle to the right.
     HalfOccluded,
-    /// Vehicle and background change places: in one mask, in all.
+    /// Vehicle and background are exchanged: in one mask, in all.
     OneMaskInverted,
     AllMasksInverted,
-    /// Each view has the next one's masks; photographs; both and depth too.
+    /// Each view has the next view's masks; photographs; masks, photographs and depth.
     MasksOff,
     PhotographsOff,
     FramesOff,
     /// The second view has the third's photograph.
     OnePhotographOff,
-    /// The second camera goes around the vehicle's axis by so many degrees.
+    /// The second camera is turned around the vehicle's axis by an angle in degrees.
     OnePoseTurned(f64),
-    /// The second view and the third.
+    /// The second and the third view.
     TwoFramesSwapped,
-    /// x and y of the poses' world; y and z, with a sign so that it is a rotation.
+    /// x and y of the world of the poses; y and z, with a sign so that it is a rotation.
     AxesXy,
     AxesYz,
-    /// The poses' metres.
+    /// Scale of the positions.
     PosesScaled(f64),
     /// Metres along y.
     PlaneOff(f64),
@@ -99,11 +99,11 @@ enum Fault {
     /// k1 of all lenses; of one.
     Lens(f64),
     OneLens(f64),
-    /// The depth's metres.
+    /// Scale of the depth.
     DepthScaled(f32),
-    /// The second view's depth.
+    /// Scale of the second view's depth.
     OneDepthScaled(f32),
-    /// Each view has the next one's depth.
+    /// Each view has the next view's depth.
     DepthOff,
 }
 
@@ -190,7 +190,7 @@ impl Fault {
         matches!(self, Self::DepthScaled(_) | Self::OneDepthScaled(_) | Self::DepthOff)
     }
 
-    /// Test views move with the frame where it is only another one of the same vehicle.
+    /// Changes the input. Test views move with the frame if it is only another frame of the same vehicle.
     fn apply(self, seed: u64, input: &mut Scene, test: &mut Scene) -> Result<()> {
         let mut random = Random::new(seed);
         let views = &mut input.views;
@@ -293,7 +293,7 @@ fn inverted(mask: &Mask) -> Result<Mask> {
     Mask::new(mask.width(), mask.height(), mask.labels().iter().map(other).collect())
 }
 
-/// Pixels with `label` no further than `radius` pixels away take it.
+/// Sets all pixels within `radius` pixels of a pixel with `label` to that label.
 fn grown(mask: &Mask, radius: u32, label: Label) -> Result<Mask> {
     let (w, h, r) = (mask.width() as i32, mask.height() as i32, radius as i32);
     let at = |x: i32, y: i32| mask.labels()[(y.clamp(0, h - 1) * w + x.clamp(0, w - 1)) as usize];
@@ -324,7 +324,7 @@ struct Vehicle {
 }
 
 impl Vehicle {
-    /// All keys.
+    /// Opens a scene with all keys of its split.
     fn open(folder: &Path) -> Result<Vec<Self>> {
         let path = folder.join("split.json");
         let broken = |e: String| Error::argument(path.display().to_string(), e, "a split.json");
@@ -333,12 +333,12 @@ impl Vehicle {
             serde_json::from_slice(&bytes).map_err(|e| broken(e.to_string()))?;
         let scene = folder.file_name().unwrap_or_default().to_string_lossy();
         let one = |(key, mut split): (String, BTreeMap<String, Vec<String>>)| {
-            let mut of = |name: &str| split.remove(name).ok_or_else(|| broken(format!("no {name}")));
+            let mut names = |name: &str| split.remove(name).ok_or_else(|| broken(format!("no {name}")));
             Ok(Self {
                 name: format!("{scene}/{key}"),
                 folder: folder.into(),
-                input: of("input")?,
-                test: of("test")?,
+                input: names("input")?,
+                test: names("test")?,
             })
         };
         splits.into_iter().map(one).collect()
@@ -351,7 +351,7 @@ impl Vehicle {
     }
 }
 
-/// Prints the row; how many verdicts are not what is expected.
+/// Prints the row. Returns the number of unexpected verdicts.
 fn row(vehicles: &[Vehicle], case: &Case, depth: bool, arguments: &Arguments) -> Result<usize> {
     let mut verdicts = [0; 4];
     let (mut refused, mut wrong, mut unseen) = (0, 0, Vec::new());
@@ -424,7 +424,7 @@ impl Arguments {
         while let Some(argument) = arguments.next() {
             let mut value = || arguments.next().unwrap_or_default();
             match argument.as_str() {
-                // What cargo itself passes.
+                // Passed by cargo itself.
                 "--bench" => {}
                 "--only" => read.only = value().split(',').map(Into::into).collect(),
                 "--case" => read.case = value(),
@@ -463,7 +463,7 @@ impl Arguments {
         Ok(vehicles.into_iter().flatten().collect())
     }
 
-    /// A line of the figures' file.
+    /// Appends a line to the file of figures.
     fn note(&self, vehicle: &Vehicle, case: &Case, depth: bool, found: &serde_json::Value) -> Result<()> {
         let Some(path) = &self.figures else { return Ok(()) };
         let line =

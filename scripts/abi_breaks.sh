@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Breaks the ABI on purpose, one way at a time, and prints which tests notice; fails where none does. Works on a clean
-# checkout only, and leaves it clean.
+# Breaks the ABI on purpose, in one way at a time, and prints which tests notice. Fails if none does. Needs a clean
+# checkout, and leaves it clean.
 #
 #     scripts/abi_breaks.sh            all ways
-#     scripts/abi_breaks.sh WORDS      those that are called by these words
+#     scripts/abi_breaks.sh WORDS      those whose name contains these words
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -17,7 +17,7 @@ only=${1:-}
 unnoticed=0
 
 failing() {
-    # Slow tests of behaviour are left out; the client is enough to tell.
+    # Slow tests of behaviour are left out; the client is enough to detect them.
     { cargo test --package libvg --lib 2>&1; cargo test --package libvg --test abi -- --skip valgrind --skip arguments --skip compiles_clean 2>&1; } |
         sed -n 's/^test \(.*\) \.\.\. FAILED$/    \1/p; s/^error\[\(.*\)/    does not compile: \1/p' || true
 }
@@ -52,7 +52,7 @@ change_type() { perl -0pi -e 's/fn vg_context_threads\(context: \*const vg_conte
 change_comment() { perl -pi -e 's/Makes a context\./Makes one context./' src/capi/context.rs; }
 change_behaviour() { perl -pi -e 's/sh_degree: 2,/sh_degree: 1,/' src/capi/options.rs; }
 
-# What no type and no name tells: the same fields and numbers, with another meaning.
+# Changes of meaning with the same fields, names and numbers, which no type shows.
 change_default() { perl -pi -e 's/^(            photo:) 1,/$1 0,/' src/capi/options.rs; }
 swap_length_and_width() { perl -pi -e 's/\|b\| b\.size_m\)/|b| [b.size_m[1], b.size_m[0], b.size_m[2]])/' src/capi/report.rs; }
 seconds_for_milliseconds() { perl -pi -e 's/total_ms: report\.total_ms,/total_ms: report.total_ms \/ 1e3,/' src/capi/report.rs; }

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Which lines of the C face its own tests and tests/abi run: a table, and each line that nobody ran.
+# Lists which lines of the C interface its own tests and tests/abi run: a table, and each line that is not run.
 #
-#     scripts/coverage.sh [PATH]      PATH: what is reported on, src/capi unless said otherwise
+#     scripts/coverage.sh [PATH]      PATH: the folder to report on (default: src/capi)
 #
 # Needs LLVM's tools of the compiler's own LLVM version: `rustup component add llvm-tools`, or the packages of
 # apt.llvm.org.
@@ -17,7 +17,7 @@ tool() {
     elif command -v "$1-$version" >/dev/null; then
         echo "$1-$version"
     else
-        echo "coverage: neither $tools/$1 nor $1-$version is here" >&2
+        echo "coverage: neither $tools/$1 nor $1-$version was found" >&2
         exit 1
     fi
 }

@@ -38,7 +38,7 @@ MARKS = {
     "OFL-1.1": ["SIL Open Font License Version 1.1"],
 }
 
-# What a crate's manifest does not say: the licences of all that is in it, and the file with their text. As in deny.toml.
+# Corrections of a crate's manifest: the licences of all its contents, and the file with their text. As in deny.toml.
 CLARIFIED = {"notosans": ("(MIT OR Apache-2.0) AND OFL-1.1", "fonts/LICENSE_OFL.txt")}
 
 # Shortest and plainest first.
@@ -141,7 +141,7 @@ def is_text_of(licence, text):
 
 
 def read_texts(package):
-    """Licence files and notices beside a crate's manifest: {file name: text}."""
+    """Licence files and notices next to a crate's manifest: {file name: text}."""
     folder = Path(package["manifest_path"]).parent
     names = re.compile(r"(?i)(un)?licen[cs]e|copying|notice")
     files = sorted(f for f in folder.iterdir() if f.is_file() and names.match(f.name))
@@ -165,12 +165,12 @@ def repository(package):
 
 
 def text_of(licence, texts):
-    """The shortest of a crate's files that has the licence: one with that licence alone, where there is one."""
+    """The shortest of a crate's files that has the licence, preferably one with that licence alone."""
     return min((t for t in texts.values() if is_text_of(licence, t)), key=len, default=None)
 
 
 def collect(packages):
-    """Rows of (crate, its licences), and for each text the crates that it stands for."""
+    """Rows of (crate, its licences), and for each text the crates that it covers."""
     all_texts = [(p, read_texts(p)) for p in packages]
     rows, users = [], {}
     for package, texts in all_texts:
@@ -195,7 +195,7 @@ def collect(packages):
 def make(args):
     listed = json.loads(cargo("metadata", "--format-version=1", "--locked", "--all-features"))
     wanted = linked(args)
-    # Path dependencies are our own.
+    # Path dependencies are part of this repository.
     packages = [p for p in listed["packages"] if p["source"] and (p["name"], p["version"]) in wanted]
     packages.sort(key=lambda p: (p["name"], p["version"]))
     rows, users = collect(packages)
@@ -216,7 +216,7 @@ def main():
     parser.add_argument("--package", default="libvg", help="of the workspace; the C library if not given")
     parser.add_argument("--output", default=ROOT / "LICENSES-THIRD-PARTY", type=Path)
     parser.add_argument("--features", help="separated by commas")
-    parser.add_argument("--target", action="append", help="may be repeated; Linux on x86-64 and ARM if not given")
+    parser.add_argument("--target", action="append", help="may be repeated; default: Linux on x86-64 and ARM")
     parser.add_argument("--check", action="store_true", help="write nothing; fail if the file is out of date")
     args = parser.parse_args()
     output = args.output

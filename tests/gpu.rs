@@ -1,4 +1,4 @@
-//! The graphics processor through the C functions: the bytes of Rust, several pictures of one call, and the gradients.
+//! The GPU through the C functions: the bytes of Rust, several pictures per call, and the gradients.
 #![allow(unsafe_code)]
 
 use std::ffi::CStr;
@@ -15,7 +15,7 @@ const WIDTH: u32 = 61;
 const HEIGHT: u32 = 47;
 const PIXELS: usize = (WIDTH * HEIGHT) as usize;
 
-/// What an `_init` function makes.
+/// A struct after its `_init` function.
 fn initial<T>(init: unsafe extern "C" fn(*mut T, usize) -> vg_status) -> T {
     let mut value = MaybeUninit::uninit();
     unsafe {
@@ -70,7 +70,7 @@ fn c_gets_the_devices_pictures_and_gradients() {
         (0..800).map(|i| if i % 2 == 0 { [1.0, 0.0, 0.0, 0.0] } else { [0.0, 0.0, 1.0, 0.0] }).collect();
     let (means, scales, opacities) = (g.means().to_vec(), g.scales().to_vec(), g.opacities().to_vec());
     let gaussians = Gaussians::from_arrays(2, means, turned, scales, opacities, g.sh().to_vec()).unwrap();
-    // Turned by right angles: whole numbers are the same on both sides.
+    // Rotated by right angles, whose entries are exact in Rust and in C.
     let cameras = [0.0, 0.7].map(|y| {
         let mut camera = forward(WIDTH, HEIGHT, 60.0);
         camera.vehicle_from_camera.translation = glam::DVec3::new(-6.0, y, 0.0);
@@ -104,7 +104,7 @@ fn c_gets_the_devices_pictures_and_gradients() {
         });
         let status = vg_renderer_render(ready, c_cameras.as_ptr(), 2, &how, targets.as_ptr(), null_mut());
         assert_eq!(status, vg_status::Ok);
-        // Without a renderer of its own, the first picture again.
+        // Without a renderer handle, the first picture again.
         let status = vg_render(model, &c_cameras[0], &how, &targets[2], null_mut());
         assert_eq!(status, vg_status::Ok);
         for (i, camera) in [(0, 0), (1, 1), (2, 0)] {

@@ -1,9 +1,9 @@
-"""Writes tests/data/colmap: a COLMAP model with multi-camera rigs, and what it should be read as.
+"""Writes tests/data/colmap: a COLMAP model with multi-camera rigs, and its expected values.
 
     pip install pycolmap==4.2.1
     python tests/make_colmap_models.py tests/data/colmap
 
-Eight cameras in four rigs of two, one camera of each model that is understood (and a second pinhole).
+Eight cameras in four rigs of two, one camera of each supported model (and a second pinhole).
 Folder bin/ holds the binary files of pycolmap, txt/ its text files; both with rigs and frames.
 """
 

@@ -1,4 +1,4 @@
-//! Networks through the C functions: the bytes of Rust, one model for many threads, and nothing left of a freed one.
+//! Networks through the C functions: the bytes of Rust, one model for many threads, and no memory left by a freed one.
 #![allow(unsafe_code)]
 
 use std::ffi::{CStr, CString};
@@ -22,16 +22,16 @@ use vg_testing::vehicle::{right_side, without_depth};
 const WIDTH: u32 = 96;
 const HEIGHT: u32 = 72;
 
-/// Of the runtime, in Rust and in C.
+/// Threads of the runtime, in Rust and in C.
 const THREADS: u32 = 2;
 
-/// What C would be told.
+/// The status and message that C gets.
 type Refusal = (vg_status, String);
 
-/// A model as C holds it.
+/// A model handle of C.
 struct Handle(*mut vg_model);
 
-// SAFETY: what the header promises of a `vg_model`, and these tests hold it to.
+// SAFETY: the header promises this of a `vg_model`, and these tests check it.
 unsafe impl Send for Handle {}
 unsafe impl Sync for Handle {}
 
@@ -41,7 +41,7 @@ impl Drop for Handle {
     }
 }
 
-/// Takes an error's words and frees it.
+/// Returns the message of an error and frees it.
 unsafe fn refusal(status: vg_status, error: *mut vg_error) -> Refusal {
     unsafe {
         let words = CStr::from_ptr(vg_error_message(error)).to_str().unwrap().to_owned();
@@ -72,7 +72,7 @@ fn opened_with(path: &Path, options: &vg_model_options) -> Result<Handle, Refusa
     }
 }
 
-/// As every C program would open it; `None` where there is no runtime.
+/// Opens a model as a C program would; `None` if there is no runtime.
 fn opened(path: &Path) -> Option<Handle> {
     match opened_with(path, &model_options(THREADS)) {
         Ok(model) => Some(model),
@@ -85,7 +85,7 @@ fn opened(path: &Path) -> Option<Handle> {
     }
 }
 
-/// The view as C sees it, pointing into ours.
+/// The view in C, pointing into that of Rust.
 fn lent(view: &View) -> vg_view {
     let mut lent = std::mem::MaybeUninit::uninit();
     let mut lent: vg_view = unsafe {
@@ -168,7 +168,7 @@ impl Made {
         }
     }
 
-    /// All arrays, one after another.
+    /// All arrays, concatenated.
     fn bits(&self) -> Vec<u32> {
         unsafe {
             let (g, n) = (self.gaussians.cast_const(), vg_gaussians_count(self.gaussians));
@@ -198,7 +198,7 @@ fn bits_of_rust(made: &Reconstruction) -> Vec<u32> {
     arrays.into_iter().flatten().map(|v| v.to_bits()).collect()
 }
 
-/// A prior that knows the vehicle and a head that makes equal Gaussians, in files.
+/// Writes a prior with the exact vehicle and a head that makes equal Gaussians.
 fn written(name: &str, scene: &Scene) -> [std::path::PathBuf; 2] {
     let [prior, head] = ["prior", "head"].map(|kind| file(&format!("{name}-{kind}")));
     ellipsoid(&scene.views[0].camera, WIDTH.into(), HEIGHT.into(), Manner::PLAIN).write(&prior);
@@ -269,7 +269,7 @@ fn many_threads_share_one_model_each_with_a_context_of_its_own() {
 }
 
 #[test]
-fn what_does_not_go_together_is_refused_by_the_names_of_the_header() {
+fn incompatible_options_are_refused_by_the_names_of_the_header() {
     let scene = right_side(WIDTH, HEIGHT);
     let [prior_path, head_path] = written("refused", &scene);
     let Some(prior) = opened(&prior_path) else { return };
@@ -285,7 +285,7 @@ fn what_does_not_go_together_is_refused_by_the_names_of_the_header() {
         assert_eq!(status, vg_status::Argument);
         assert!(words.starts_with("options.prior_model: ") && words.contains("the prior onnx"), "{words}");
     }
-    // Each in the other's place.
+    // Each model in the place of the other.
     let (status, words) = refused(&options(Some(&head), None));
     assert!(status == vg_status::Format && words.contains("refused-head.onnx: metadata vg."), "{words}");
     let (status, words) = refused(&options(None, Some(&prior)));
@@ -308,7 +308,7 @@ fn what_does_not_go_together_is_refused_by_the_names_of_the_header() {
 }
 
 #[test]
-fn a_mask_of_c_is_that_of_rust() {
+fn a_mask_from_c_equals_that_of_rust() {
     let view = &right_side(WIDTH, HEIGHT).views[1];
     let (graph, path) = (brightness(Some((64, 64))), file("c-mask"));
     graph.write(&path);
@@ -329,7 +329,7 @@ fn a_mask_of_c_is_that_of_rust() {
             status => Err(refusal(status, error)),
         }
     };
-    // One row after another, the last without a gap behind it.
+    // Rows with gaps, the last without a gap after it.
     let mut mask = vec![77u8; stride * (HEIGHT as usize - 1) + width];
     segment(&lent.image, &mut mask).unwrap();
     for (v, row) in mask.chunks(stride).enumerate() {
@@ -373,11 +373,11 @@ fn threads_of_the_process() -> usize {
 #[test]
 #[ignore = "counts the threads of its process"]
 #[cfg(target_os = "linux")]
-fn alone_twenty_vehicles_leave_nothing_of_their_model() {
+fn alone_twenty_vehicles_leave_no_thread_of_their_model() {
     const MODEL_THREADS: u32 = 5;
     let scene = without_depth(right_side(WIDTH, HEIGHT));
     let [prior_path, head_path] = written("twenty", &scene);
-    // The runtime itself starts nothing that it ends before the process does.
+    // The runtime itself starts no thread that ends before the process does.
     let Some(first) = opened(&head_path) else { return };
     drop(first);
     let before = threads_of_the_process();
@@ -386,7 +386,7 @@ fn alone_twenty_vehicles_leave_nothing_of_their_model() {
     let prior = opened_with(&prior_path, &model_options(MODEL_THREADS)).ok().unwrap();
     let head = opened_with(&head_path, &model_options(MODEL_THREADS)).ok().unwrap();
     let opened_in = start.elapsed().as_secs_f64();
-    // The thread that calls is one of the model's.
+    // The calling thread is one of the model's threads.
     assert!(threads_of_the_process() >= before + 2 * (MODEL_THREADS as usize - 1));
     let mut context = null_mut();
     assert_eq!(unsafe { vg_context_new(null(), &raw mut context, null_mut()) }, vg_status::Ok);
@@ -408,13 +408,13 @@ fn alone_twenty_vehicles_leave_nothing_of_their_model() {
         1e3 * warm[warm.len() / 2]
     ));
     unsafe { vg_context_free(context) };
-    // Vehicles and reports are still there; the networks' threads are not.
+    // Vehicles and reports remain; the networks' threads do not.
     drop((prior, head));
     for _ in 0..1000 {
         if threads_of_the_process() == before {
             break;
         }
-        // A thread that was joined is listed until the kernel has buried it.
+        // A joined thread is listed until the kernel has removed it.
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
     assert_eq!(threads_of_the_process(), before);
@@ -423,9 +423,9 @@ fn alone_twenty_vehicles_leave_nothing_of_their_model() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn twenty_vehicles_leave_nothing_of_their_model() {
+fn twenty_vehicles_leave_no_thread_of_their_model() {
     let mut child = Command::new(std::env::current_exe().unwrap());
-    let name = "c_abi::alone_twenty_vehicles_leave_nothing_of_their_model";
+    let name = "c_abi::alone_twenty_vehicles_leave_no_thread_of_their_model";
     let output = child.args(["--exact", name, "--ignored", "--nocapture"]).output().unwrap();
     let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert!(output.status.success() && out.contains("1 passed"), "{out}{err}");

@@ -1,9 +1,8 @@
-//! What a C or C++ program gets: the installed package, moved elsewhere, and the examples built against it,
-//! judged by the pictures they draw of the side that was not photographed. And `vg.hpp`, under every compiler
-//! there is.
+//! Packages for C and C++ programs: the installed package, moved to another folder, and the examples built against it,
+//! with the error of their pictures of the unseen side. Also `vg.hpp`, under every compiler that is installed.
 //!
-//! The library is built once, optimised, in `target`, where the demo is built too. What this machine lacks is
-//! skipped with a printed reason; `VG_NO_SKIP=1` makes it a failure.
+//! The library is built once, optimised, in `target`, as the demo is. Tests whose tools are missing are skipped with a
+//! printed reason; `VG_NO_SKIP=1` makes it a failure.
 
 #![cfg(target_os = "linux")]
 
@@ -21,7 +20,7 @@ use vg_testing::{root, say};
 
 // ---- The package
 
-/// The package in a folder where it was not installed.
+/// The package, moved from the folder where it was installed.
 struct Package {
     folder: tempfile::TempDir,
 }
@@ -40,7 +39,7 @@ impl Package {
         configure.arg("-S").arg(root()).arg("-B").arg(&build);
         configure.arg(define("VG_CARGO_TARGET_DIR", &cargo_target));
         configure.arg(define("CMAKE_INSTALL_PREFIX", &installed));
-        configure.arg("-DCMAKE_INSTALL_LIBDIR=lib"); // some distributions say lib64
+        configure.arg("-DCMAKE_INSTALL_LIBDIR=lib"); // the default is lib64 on some distributions
         if let Some(cargo) = std::env::var_os("CARGO") {
             configure.arg(define("CARGO_EXECUTABLE", Path::new(&cargo)));
         }
@@ -54,7 +53,7 @@ impl Package {
     }
 }
 
-/// The package that all tests of this run share, or nothing where a tool is missing.
+/// The package shared by all tests of this run, or `None` if a tool is missing.
 fn package() -> Option<Arc<Package>> {
     static SHARED: Mutex<Weak<Package>> = Mutex::new(Weak::new());
     let what = "the CMake package";
@@ -67,7 +66,7 @@ fn package() -> Option<Arc<Package>> {
     Some(package)
 }
 
-/// A program that finds libraries as it would in a user's shell, not in cargo's folders.
+/// A program that finds libraries as in a user's shell, without cargo's folders.
 fn program(name: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(name);
     command.env_remove("LD_LIBRARY_PATH");
@@ -88,7 +87,7 @@ fn pkg_config(package: &Package, arguments: &[&str]) -> Vec<String> {
     run(command.args(arguments)).split_whitespace().map(str::to_owned).collect()
 }
 
-/// Whether pkg-config knows a library.
+/// Whether pkg-config finds a library.
 fn have_library(name: &str, package: &str, what: &str) -> bool {
     if !have("pkg-config", "pkg-config", what) {
         return false;
@@ -119,7 +118,7 @@ fn files_below(folder: &Path) -> BTreeSet<String> {
 }
 
 #[test]
-fn the_package_holds_what_it_says_and_nothing_of_where_it_was_made() {
+fn the_package_has_its_files_and_no_path_of_the_build() {
     let Some(package) = package() else { return };
     let prefix = package.prefix();
     let version = env!("CARGO_PKG_VERSION");
@@ -165,7 +164,7 @@ fn the_package_holds_what_it_says_and_nothing_of_where_it_was_made() {
 }
 
 #[test]
-fn find_package_takes_the_versions_that_this_one_serves() {
+fn find_package_accepts_compatible_versions() {
     let Some(package) = package() else { return };
     let folder = scratch();
     let (major, minor) = (env!("CARGO_PKG_VERSION_MAJOR"), env!("CARGO_PKG_VERSION_MINOR"));
@@ -193,7 +192,7 @@ fn find_package_takes_the_versions_that_this_one_serves() {
 
 // ---- The examples
 
-/// Photographs of the side that no example is shown, on white.
+/// Photographs, on white, of the side that no example gets as input.
 fn unseen() -> Scene {
     open(&UNSEEN, false).unwrap()
 }
@@ -213,7 +212,7 @@ fn read_ppm(path: &Path) -> Vec<[f32; 3]> {
     unit(bytes[header..].as_chunks::<3>().0)
 }
 
-/// Runs `embed_min` on the sample; its error on the first view of the unseen side, dB.
+/// Runs `embed_min` on the sample. Returns its error on the first view of the unseen side, dB.
 fn embed_min_psnr(embed_min: &Path, folder: &Path) -> f64 {
     let picture = folder.join("unseen.ppm");
     run(program(embed_min).arg(sample()).arg(INPUTS.len().to_string()).arg(&picture));
@@ -222,7 +221,7 @@ fn embed_min_psnr(embed_min: &Path, folder: &Path) -> f64 {
     psnr
 }
 
-/// Runs `opencv_onesided` on the sample; its mean error on the unseen side, dB.
+/// Runs `opencv_onesided` on the sample. Returns its mean error on the unseen side, dB.
 fn opencv_onesided_psnr(opencv_onesided: &Path, folder: &Path, flags: &[&str]) -> f64 {
     run(program(opencv_onesided).arg(sample()).arg(folder).args(flags));
     let psnrs = unseen().views.into_iter().zip(UNSEEN).map(|(view, name)| {
@@ -232,7 +231,7 @@ fn opencv_onesided_psnr(opencv_onesided: &Path, folder: &Path, flags: &[&str]) -
     psnrs.sum::<f64>() / UNSEEN.len() as f64
 }
 
-/// Runs `colmap_vehicle` on the sample; the mean error of its model on the unseen side, dB.
+/// Runs `colmap_vehicle` on the sample. Returns the mean error of its model on the unseen side, dB.
 fn colmap_vehicle_psnr(colmap_vehicle: &Path, folder: &Path) -> f64 {
     let model = folder.join("car.ply");
     let mut command = program(colmap_vehicle);
@@ -248,7 +247,7 @@ fn colmap_vehicle_psnr(colmap_vehicle: &Path, folder: &Path) -> f64 {
     ViewErrors::mean(&errors.collect::<Vec<_>>()).unwrap().psnr_db
 }
 
-/// The bounds are a good half decibel below what README.md promises of the sample.
+/// The bounds are more than half a decibel below the figures of README.md for the sample.
 #[test]
 fn examples_built_against_the_moved_package_draw_the_unseen_side() {
     let Some(package) = package() else { return };
@@ -303,7 +302,7 @@ fn pkg_config_links_a_program_with_the_shared_and_with_the_static_library() {
     let mut command = program(cc());
     command.arg(&source).args(pkg_config(&package, &["--static", "--cflags", "--libs", "vg"]));
     run(command.arg("-static").arg("-o").arg(&alone));
-    // It needs no file of the package any more.
+    // The static program no longer needs the files of the package.
     drop(package);
     let the_same = embed_min_psnr(&alone, folder.path());
     assert!(psnr.to_bits() == the_same.to_bits(), "shared {psnr} dB, static {the_same} dB");
@@ -318,7 +317,7 @@ fn test_source(name: &str) -> PathBuf {
     root().join("tests/cpp").join(name)
 }
 
-/// A compiler that takes no warning, with the header's folder. Other people's headers are theirs.
+/// A compiler with warnings as errors, with the header's folder. Headers of other projects are exempt.
 fn strict(compiler: &str, standard: &str, system: &[String]) -> Command {
     let mut command = program(compiler);
     command.args(STRICT).args(["-Wconversion", "-Wshadow"]).arg(format!("-std={standard}"));
@@ -327,7 +326,7 @@ fn strict(compiler: &str, standard: &str, system: &[String]) -> Command {
     command
 }
 
-/// Compiles and runs a test in C++ with the library that cargo built beside this one.
+/// Compiles and runs a test in C++ with the library that cargo built.
 fn run_test(mut compile: Command, sources: &[&str], libraries: &[String]) {
     let folder = scratch();
     vg_testing::tools::library_folder(folder.path());
@@ -340,7 +339,7 @@ fn run_test(mut compile: Command, sources: &[&str], libraries: &[String]) {
     assert!(result.status.success() && errors.is_empty(), "{}\n{errors}", result.status);
 }
 
-/// Both compilers with both standards, where they are there.
+/// The installed compilers, each with both standards.
 fn compilers() -> Vec<(String, &'static str)> {
     let mut compilers = vec![];
     for name in ["g++", "clang++"] {
@@ -362,7 +361,7 @@ fn vg_hpp_alone_compiles_clean_and_keeps_its_promises_without_exceptions() {
 }
 
 #[test]
-fn vg_hpp_throws_where_it_is_told_to_beside_files_that_are_not() {
+fn vg_hpp_throws_in_files_that_enable_exceptions_and_not_in_others() {
     for (compiler, standard) in compilers() {
         let command = |extra: &[&str], source: &str| {
             let mut command = strict(&compiler, standard, &[]);
@@ -378,7 +377,7 @@ fn vg_hpp_throws_where_it_is_told_to_beside_files_that_are_not() {
     }
 }
 
-/// The programs in the comment that `vg.hpp` begins with.
+/// The programs in the opening comment of `vg.hpp`.
 fn examples_of_vg_hpp() -> Vec<String> {
     let header = std::fs::read_to_string(root().join("include/vg.hpp")).unwrap();
     let comment = header.split_once("*/").unwrap().0;
@@ -386,7 +385,7 @@ fn examples_of_vg_hpp() -> Vec<String> {
     for line in comment.lines() {
         match line.strip_prefix(" *     ") {
             Some(code) => *examples.last_mut().unwrap() += &format!("{code}\n"),
-            // An empty line inside a program, or what follows it.
+            // An empty line inside a program, or the text after it.
             None if line == " *" => *examples.last_mut().unwrap() += "\n",
             None => examples.push(String::new()),
         }
@@ -396,7 +395,7 @@ fn examples_of_vg_hpp() -> Vec<String> {
 }
 
 #[test]
-fn the_examples_in_vg_hpp_compile_and_say_why_they_made_nothing() {
+fn the_examples_in_vg_hpp_compile_and_print_their_errors() {
     if !have(&cxx(), "g++", "the examples in vg.hpp") {
         return;
     }
@@ -420,7 +419,7 @@ fn the_examples_in_vg_hpp_compile_and_say_why_they_made_nothing() {
 }
 
 #[test]
-fn vg_hpp_takes_and_fills_matrices_of_opencv() {
+fn vg_hpp_reads_and_fills_matrices_of_opencv() {
     if !have(&cxx(), "g++", "vg.hpp with OpenCV")
         || !have_library("opencv4", "libopencv-dev", "vg.hpp with OpenCV")
     {
@@ -430,7 +429,7 @@ fn vg_hpp_takes_and_fills_matrices_of_opencv() {
         run(program("pkg-config").args([what, "opencv4"])).split_whitespace().map(str::to_owned).collect()
     };
     let include = query("--cflags-only-I");
-    // All of OpenCV takes a second to load.
+    // Loading all of OpenCV takes a second.
     let mut libraries = query("--libs-only-L");
     libraries.push("-lopencv_core".into());
     run_test(strict(&cxx(), "c++17", &include), &["opencv.cpp"], &libraries);
@@ -440,7 +439,7 @@ fn vg_hpp_takes_and_fills_matrices_of_opencv() {
 }
 
 #[test]
-fn vg_hpp_takes_poses_of_eigen() {
+fn vg_hpp_accepts_poses_of_eigen() {
     if !have(&cxx(), "g++", "vg.hpp with Eigen")
         || !have_library("eigen3", "libeigen3-dev", "vg.hpp with Eigen")
     {

@@ -1,7 +1,8 @@
-//! The Python package, installed from the checkout into an environment of its own below `target`: its tests, and the
-//! bytes it gets beside those of Rust.
+//! The Python package, installed from the checkout into a virtual environment below `target`: its tests, and a
+//! comparison of its results with those of Rust.
 //!
-//! What this machine lacks is skipped with a printed reason; `VG_NO_SKIP=1` makes it a failure, but for PyTorch.
+//! Tests whose tools are missing are skipped with a printed reason; `VG_NO_SKIP=1` makes it a failure, except for
+//! PyTorch.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -9,7 +10,7 @@ use std::sync::OnceLock;
 use vg::pipeline::Options;
 use vg_testing::sample::{self, INPUTS};
 
-/// Python with the package in it, or `None` where it cannot be had.
+/// Python with the package, or `None` if it cannot be installed.
 fn python() -> Option<&'static Path> {
     static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
     PYTHON.get_or_init(installed).as_deref()
@@ -19,7 +20,7 @@ fn installed() -> Option<PathBuf> {
     let target = vg_testing::tools::target().parent()?.parent()?.to_owned();
     let environment = target.join("python");
     let python = environment.join("bin/python");
-    // Debian's python3 without python3-venv leaves an environment without pip behind.
+    // Without python3-venv, Debian's python3 leaves an environment without pip.
     if !environment.join("bin/pip").exists() {
         let mut venv = Command::new("python3");
         let made = venv.args(["-m", "venv"]).arg(&environment).output();
@@ -29,14 +30,14 @@ fn installed() -> Option<PathBuf> {
     }
     let mut pip = Command::new(&python);
     pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "./bindings/python[test]"]);
-    // The optimised dependencies of the demo and of this are the same.
+    // Shares the optimised dependencies with the build of the demo.
     let output =
         vg_testing::tools::output(pip.current_dir(vg_testing::root()).env("CARGO_TARGET_DIR", &target));
     let errors = String::from_utf8_lossy(&output.stderr);
     if output.status.success() {
         return Some(python);
     }
-    // Nothing of ours can cause this one.
+    // The package itself cannot cause this error.
     if errors.contains("No matching distribution found") {
         return lacking("packages that cannot be had from PyPI");
     }
@@ -58,14 +59,14 @@ fn the_python_package_passes_its_tests() {
     let printed = vg_testing::tools::run(&mut pytest);
     assert!(printed.contains(" passed"), "{printed}");
     for line in printed.lines().filter(|line| line.starts_with("SKIPPED")) {
-        // Gigabytes that nothing else needs: not among the packages of the tests.
+        // PyTorch has gigabytes and is not needed elsewhere, so it is not among the packages of the tests.
         let may_lack = line.ends_with("PyTorch is not installed");
         assert!(may_lack || std::env::var_os("VG_NO_SKIP").is_none(), "{line}");
         vg_testing::say(&format!("skipped: {line}"));
     }
 }
 
-/// Reconstructs the sample by both faces and leaves their arrays, one file each.
+/// Reconstructs the sample through both interfaces and writes their arrays, one file each.
 const SCRIPT: &str = r#"
 import sys
 from pathlib import Path
@@ -81,7 +82,7 @@ for name, face in ("native", vg), ("ctypes", capi):
 "#;
 
 #[test]
-fn python_gets_the_bytes_of_rust_by_either_face() {
+fn both_python_interfaces_return_the_bytes_of_rust() {
     let Some(python) = python() else { return };
     let made = sample::run(&sample::open(&INPUTS, true).unwrap(), &Options::default()).unwrap();
     let g = &made.gaussians;

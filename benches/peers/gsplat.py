@@ -2,8 +2,9 @@
 
     python gsplat.py MODEL.ply WIDTH HEIGHT K VIEW [VIEW ...]
 
-K is fx,fy,cx,cy; each VIEW is a row-major 4x4 matrix from the vehicle to the camera, sixteen numbers with commas; they are
-drawn in turns. Prints the median of the forward pass and of both ways, with depth, in milliseconds, or why there is none.
+K is fx,fy,cx,cy; each VIEW is a row-major 4x4 matrix from the vehicle to the camera, sixteen numbers with commas; the views
+are drawn in turns. Prints the medians of the forward pass and of forward and backward, with depth, in milliseconds, or the
+reason why there are none.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ BUDGET = 6.0
 
 
 def read(path: Path) -> dict[str, np.ndarray]:
-    """Attributes of a PLY in 3DGS's layout, as rasterization wants them."""
+    """Attributes of a PLY in 3DGS's layout, in the form that rasterization takes."""
     data = path.read_bytes()
     end = data.index(b"end_header\n") + len(b"end_header\n")
     header = data[:end].decode("ascii").splitlines()
@@ -75,7 +76,7 @@ def main(arguments: list[str]) -> None:
         with torch.no_grad():
             draw(turn)
 
-    def both_ways(turn: int) -> None:
+    def forward_backward(turn: int) -> None:
         for tensor in tensors.values():
             tensor.grad = None
         draw(turn).square().mean().backward()
@@ -89,13 +90,13 @@ def main(arguments: list[str]) -> None:
             work(len(times))  # type: ignore[operator]
             torch.cuda.synchronize()
             times.append(1e3 * (time.perf_counter() - start))
-        # The first ones compile, and fill caches.
+        # The first runs compile, and fill caches.
         return statistics.median(times[3:])
 
     once = median(forward)
     for tensor in tensors.values():
         tensor.requires_grad_()
-    print(f"{once:.2f} ms forward, {median(both_ways):.2f} ms both ways, {torch.cuda.get_device_name()}")
+    print(f"{once:.2f} ms forward, {median(forward_backward):.2f} ms forward and backward, {torch.cuda.get_device_name()}")
 
 
 if __name__ == "__main__":

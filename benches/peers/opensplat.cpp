@@ -1,7 +1,7 @@
-// Steps of OpenSplat's CPU renderer, for opensplat.py: built with the sources of a checkout, none of which is here.
+// Steps of OpenSplat's CPU renderer, for opensplat.py: built with the sources of a clone, none of which is here.
 //
 // The calls, their order and their arguments are those of OpenSplat's own training step on the CPU, from its
-// Model::forward to its optimisers, without what only densification needs (the gradients that it keeps of splat centres).
+// Model::forward to its optimisers, without the part for densification (gradients of splat centres).
 
 #include <torch/extension.h>
 
@@ -23,10 +23,11 @@ using torch::indexing::Slice;
 
 constexpr float SSIM_WEIGHT = 0.2f;
 
-// Whether colour knows that its direction turns with the centre. OpenSplat's does not; a check of gradients asks for it.
+// Whether the derivative of colour with respect to the centre, through the view direction, is included. OpenSplat omits
+// it.
 enum class Turn { Left, Taken };
 
-// Projection as OpenSplat makes it: the principal point is the picture's middle.
+// OpenSplat's projection: the principal point is the middle of the picture.
 Tensor projection(float fx, float fy, int width, int height) {
     constexpr float NEAR = 0.001f, FAR = 1000.0f;
     return torch::tensor({
@@ -39,8 +40,9 @@ Tensor projection(float fx, float fy, int width, int height) {
 
 class Peer {
 public:
-    // Parameters as OpenSplat keeps them: means, ln scales [n][3], quaternions [n][4], logits [n][1], colour [n][3] and
-    // [n][k][3]. Views: camera_from_world [v][4][4], fx fy cx cy [v][4], targets [v][h][w][3]. Rates: one of each parameter.
+    // Parameters in OpenSplat's form: means, ln scales [n][3], quaternions [n][4], logits [n][1], colour [n][3] and
+    // [n][k][3]. Views: camera_from_world [v][4][4], fx fy cx cy [v][4], targets [v][h][w][3]. Rates: one per
+    // parameter.
     Peer(std::vector<Tensor> parameters, int degree, Tensor cameras, Tensor intrinsics, Tensor targets,
          std::vector<double> rates, double noise)
         : start(std::move(parameters)), degree(degree), cameras(cameras), intrinsics(intrinsics), targets(targets),
@@ -48,7 +50,7 @@ public:
         reset();
     }
 
-    // The Gaussians of the beginning, and optimisers that know nothing.
+    // Restores the initial Gaussians and resets the optimisers.
     void reset() {
         now.clear();
         own.clear();
@@ -65,20 +67,20 @@ public:
         }
     }
 
-    // A picture, its loss and the gradient of every parameter.
+    // Draws a picture, and computes its loss and the gradient of every parameter.
     void gradients(int view) {
         descend(view);
         clear();
     }
 
-    // And a step of OpenSplat's optimisers.
+    // Picture, loss, gradients, and a step of OpenSplat's optimisers.
     void step(int view) {
         descend(view);
         for (auto &adam : own) adam->step();
         clear();
     }
 
-    // And a step of the fastest optimiser that libtorch has.
+    // Picture, loss, gradients, and a step of libtorch's fastest optimiser.
     void fused_step(int view) {
         descend(view);
         torch::NoGradGuard none;
@@ -151,7 +153,7 @@ private:
 }  // namespace
 
 PYBIND11_MODULE(TORCH_EXTENSION_NAME, module) {
-    // Autograd refuses to run with Python held.
+    // Autograd does not run while the GIL is held.
     using Release = pybind11::call_guard<pybind11::gil_scoped_release>;
     pybind11::class_<Peer>(module, "Peer")
         .def(pybind11::init<std::vector<Tensor>, int, Tensor, Tensor, Tensor, std::vector<double>, double>())

@@ -1,11 +1,11 @@
-"""Steps of OpenSplat's CPU renderer, timed in turns with the library's: `benches/refine.rs` runs this and talks to it.
+"""Steps of OpenSplat's CPU renderer, timed in turns with those of the library: a child process of `benches/refine.rs`.
 
     python opensplat.py CHECKOUT FOLDER
 
-CHECKOUT is one of OpenSplat; PyTorch, NumPy and ninja are needed. Its sources and `opensplat.cpp` become an extension,
-which PyTorch keeps. FOLDER holds `start.ply`, `job.json` and `targets.f32`. The answer to a line `gradients`, `step` or
-`fused_step` is the wall and processor seconds of one such step by each view; to `look`, the loss of the first view,
-with `picture.f32`, `means.f32` and `means_turning.f32` in the folder.
+CHECKOUT is a clone of OpenSplat; PyTorch, NumPy and ninja are needed. Its sources and `opensplat.cpp` are built into an
+extension, which PyTorch caches. FOLDER holds `start.ply`, `job.json` and `targets.f32`. The answer to a line `gradients`,
+`step` or `fused_step` is the wall and processor seconds of one such step for each view; the answer to `look` is the loss of
+the first view, with `picture.f32`, `means.f32` and `means_turning.f32` written to the folder.
 """
 
 import json
@@ -14,8 +14,8 @@ import sys
 import time
 from pathlib import Path
 
-# OpenMP's threads spin while they wait, against OpenSplat's own threads and whatever else runs: four times the
-# processor time on a busy machine. Read when PyTorch is loaded.
+# OpenMP's threads spin while they wait, and compete with OpenSplat's own threads and other programs: four times the
+# processor time on a busy machine. The variable is read when PyTorch is loaded.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import numpy as np  # noqa: E402
@@ -33,15 +33,15 @@ SOURCES = [
 
 
 def main():
-    # Answers have standard output to themselves.
+    # Standard output is only for answers.
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     checkout, folder = (Path(path) for path in sys.argv[1:])
     torch.set_num_threads(THREADS)
-    # OpenSplat starts a thread for each processor; where there are more, they share as many as the library has.
+    # OpenSplat starts a thread per processor; if there are more, they share as many as the library has.
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:THREADS])
-    # Where `ninja` is when it was installed beside this Python.
+    # Location of `ninja` if it was installed next to this Python.
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
     extension = load(
         name="vg_bench_opensplat",
@@ -86,21 +86,21 @@ def main():
 
 
 def read_gaussians(path):
-    """Parameters as OpenSplat keeps them, and the SH degree, of a PLY file of floats."""
+    """Parameters in OpenSplat's form, and the SH degree, from a PLY file of floats."""
     data = path.read_bytes()
     header, body = data.split(b"end_header\n", 1)
     names = [line.split()[-1] for line in header.decode().splitlines() if line.startswith("property")]
     rows = np.frombuffer(body, "<f4").reshape(-1, len(names))
     column = {name: rows[:, k] for k, name in enumerate(names)}
 
-    def of(prefix, count):
+    def block(prefix, count):
         return np.stack([column[f"{prefix}_{k}"] for k in range(count)], 1)
 
     bands = sum(name.startswith("f_rest_") for name in names) // 3
     # The file has the channels one after the other.
-    rest = of("f_rest", 3 * bands).reshape(-1, 3, bands).transpose(0, 2, 1)
+    rest = block("f_rest", 3 * bands).reshape(-1, 3, bands).transpose(0, 2, 1)
     means = np.stack([column[axis] for axis in "xyz"], 1)
-    arrays = [means, of("scale", 3), of("rot", 4), column["opacity"][:, None], of("f_dc", 3), rest]
+    arrays = [means, block("scale", 3), block("rot", 4), column["opacity"][:, None], block("f_dc", 3), rest]
     return [torch.from_numpy(np.ascontiguousarray(array)) for array in arrays], round((bands + 1) ** 0.5) - 1
 
 

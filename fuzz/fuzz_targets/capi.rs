@@ -1,4 +1,4 @@
-//! The functions of the C header: the bytes decide which are called and what is changed in a valid call.
+//! The functions of the C header: the bytes decide which are called and how a valid call is changed.
 #![no_main]
 
 #[path = "../src/capi.rs"]

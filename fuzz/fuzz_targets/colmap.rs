@@ -1,4 +1,4 @@
-//! The six files of a COLMAP model: the first byte says which.
+//! The six files of a COLMAP model: the first byte selects one.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -21,7 +21,7 @@ fuzz_target!(|bytes: &[u8]| {
     }
 });
 
-/// Images that were read have rotations for poses and names inside their folder.
+/// Asserts that images have rotations as poses, and names inside their folder.
 fn check(images: vg::Result<Vec<ModelImage>>) {
     let Ok(images) = images else { return };
     for image in &images {

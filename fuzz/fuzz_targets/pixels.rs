@@ -1,4 +1,4 @@
-//! Pictures and depth maps: the first byte says in which format.
+//! Pictures and depth maps: the first byte selects the format.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,4 @@
-//! Gaussians and points: what is read can be written and read again, as many as before.
+//! Gaussians and points: data that was read can be written and read again, with the same count.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -9,7 +9,7 @@ fuzz_target!(|bytes: &[u8]| {
     let path = Path::new("file.json");
     if let Ok(file) = transforms::parse(bytes, path) {
         for (i, frame) in file.frames.iter().enumerate() {
-            // What is read without a size must have a camera for any.
+            // Data read without a size has a camera for any size.
             let _ = frame.camera(frame.size.unwrap_or((640, 480)), path, &format!("frames[{i}]"));
             assert!(frame.file_path.is_relative());
         }

@@ -1,7 +1,7 @@
-//! Calls of the C functions with a few things changed: numbers, sizes, pointers, whole pictures. Memory is always as
-//! large as the call promises, so that whatever the library does, it must do without reading or writing elsewhere.
+//! Calls of the C functions with some changes: numbers, sizes, pointers, whole pictures. Memory is always as large as the
+//! call promises, so that any read or write elsewhere is a bug of the library.
 //!
-//! Valid calls, and what is checked after each, are those of the table in `tests/abi/arguments.rs`.
+//! The valid calls, and the checks after each, are those of the table in `tests/abi/arguments.rs`.
 
 pub use calls::World;
 use calls::{CALLS, CANARY, Call, Done, Lent, Made, Memory, Target, Value, text};
@@ -15,13 +15,13 @@ use vg_face::capi::*;
 #[allow(dead_code)]
 mod calls;
 
-/// None: the address sanitizer guards to the byte.
+/// No guard bytes: the address sanitizer guards to the byte.
 pub(crate) const GUARD: usize = 0;
 
-/// Largest memory that is made for a picture.
+/// Largest memory allocated for a picture.
 const MAX_BYTES: usize = 1 << 24;
 
-/// Where decisions come from.
+/// The source of decisions.
 pub trait Source {
     fn byte(&mut self) -> u8;
 
@@ -45,21 +45,21 @@ pub trait Source {
     }
 }
 
-/// What the calls are made with; the sample is in the repository, what is saved goes to `scratch`.
+/// The handles and inputs of calls. The sample is in the repository; saved files go to `scratch`.
 pub fn world(scratch: &Path) -> World {
     std::fs::create_dir_all(scratch).expect("a folder to save in");
     World::new(&vg_testing::root().join("tests/data/sedan"), scratch)
 }
 
-/// Up to three calls, each with what the ones before it made.
+/// Makes up to three calls, each with the results of the earlier ones.
 ///
 /// # Panics
-/// Where a promise of the header is broken.
+/// If a promise of the header is broken.
 pub fn execute<S: Source>(world: &World, source: &mut S) -> Vec<(&'static str, vg_status)> {
     let mut made: Vec<Done> = Vec::new();
     let mut log = Vec::new();
     for _ in 0..=source.below(3) {
-        // Where there is most to go wrong.
+        // The largest functions are called more often.
         let large: [fn(&World) -> Call; 5] = [
             calls::reconstruct,
             calls::render,
@@ -82,14 +82,14 @@ pub fn execute<S: Source>(world: &World, source: &mut S) -> Vec<(&'static str, v
         STOP_IN.set(source.below(64));
         let done = call.run(!source.one_in(8));
         log.push((call.function, done.status));
-        look_at(&done);
+        read_results(&done);
         made.push(done);
     }
     log
 }
 
-/// What a caller would read next.
-fn look_at(done: &Done) {
+/// Reads the results, as a caller would next.
+fn read_results(done: &Done) {
     let report = done.handle("out_report");
     if report != 0 {
         unsafe {
@@ -159,7 +159,7 @@ fn change<S: Source>(world: &World, call: &mut Call, made: &[Done], source: &mut
             let any = bits_of(source.pick(&NUMBERS));
             let now = *value;
             *value = match name {
-                // Of memory that stays as large as it is.
+                // Counts of memory with a fixed size.
                 "count" | "point_count" | "sparse_count" | "scan_count" | "index_count" | "keep_count" => {
                     match source.below(3) {
                         0 if !tries.is_empty() => tries[source.below(tries.len())].0,
@@ -208,7 +208,7 @@ fn change<S: Source>(world: &World, call: &mut Call, made: &[Done], source: &mut
                 0 => lent.shift = source.below(9),
                 1 => {
                     let size = source.pick(&[0, 8, lent.stride - 1, lent.stride + 8, lent.stride + 64, 4096]);
-                    // Cameras are written whole whatever they say.
+                    // Cameras are written completely, whatever their content.
                     if name != "out" || lent.of != "vg_camera" {
                         lent.resize(size, source.pick(&[0, 0, 0, 1]));
                     }
@@ -257,8 +257,7 @@ fn field<S: Source>(world: &World, call: &mut Call, i: usize, source: &mut S) {
     let k = source.below(field.count);
     let put = |lent: &mut Lent, bits: u64| lent.put_in(element, &field.name, k, bits);
     match field.name.as_str() {
-        // Of models there are none, and what a path names must be loadable.
-        // A loss has nothing to look at.
+        // No model exists, and a library at a path must be loadable. A loss callback would have nothing to read.
         "struct_size" | "prior_model" | "head_model" | "runtime" | "loss" | "loss_user" => {}
         "context" => put(lent, source.pick(&[0, world.context as u64])),
         "progress" => put(lent, source.pick(&[0, on_progress as *const () as u64])),
@@ -273,7 +272,7 @@ fn field<S: Source>(world: &World, call: &mut Call, i: usize, source: &mut S) {
             put(lent, memory.pointer() as u64);
             call.inputs.push(memory);
         }
-        // Pictures get their memory once all is decided; arrays and names may go.
+        // Pictures get their memory after all other changes; arrays and names may become NULL.
         "image.data" | "mask.data" | "depth.data" | "color" | "depth" | "positions" | "scales"
         | "rotations" | "opacities" | "sh" | "names" | "vehicle_from_world" | "alpha" | "background"
         | "pose" | "view_matrix"
@@ -285,13 +284,13 @@ fn field<S: Source>(world: &World, call: &mut Call, i: usize, source: &mut S) {
         }
         "cloud" => {
             let points: Vec<f32> = (0..9).map(|_| source.pick(&FLOATS)).collect();
-            let mut memory = Memory::of(&points, 0);
+            let mut memory = Memory::from_values(&points, 0);
             put(lent, memory.pointer() as u64);
             call.inputs.push(memory);
             let Value::Struct(lent) = &mut call.arguments[i].value else { return };
             lent.put_in(element, "cloud_count", 0, source.below(4) as u64);
         }
-        // Of a cloud that may not be there.
+        // The count of a cloud that may be NULL.
         "cloud_count" => put(lent, source.pick(&[0, 10_000_001, 1 << 60, u64::MAX])),
         "name_count" => put(lent, source.pick(&[0, 1, 2, 4097, u64::MAX])),
         "count" if lent.of == "vg_gaussian_arrays" => {
@@ -330,7 +329,7 @@ fn field<S: Source>(world: &World, call: &mut Call, i: usize, source: &mut S) {
     }
 }
 
-/// Changes that need several fields at once: other sizes, other poses, other pixels. False where there are none.
+/// Makes changes of several fields at once: other sizes, other poses, other pixels. Returns false if there are none.
 fn whole<S: Source>(call: &mut Call, world: &World, source: &mut S) -> bool {
     let (lent, camera) = match call.function {
         "vg_reconstruct" => ("views", "camera."),
@@ -374,7 +373,7 @@ fn whole<S: Source>(call: &mut Call, world: &World, source: &mut S) -> bool {
             }
         }
         1 => {
-            // Another view's place, or none in particular.
+            // The position of another view, or an arbitrary one.
             let other = &world.photographs[source.below(world.photographs.len())].camera.vehicle_from_camera;
             let turned = [0.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.5];
             let pose = if source.one_in(2) { other } else { &turned };
@@ -404,7 +403,7 @@ fn whole<S: Source>(call: &mut Call, world: &World, source: &mut S) -> bool {
     true
 }
 
-/// Changes numbers or pixels in memory that is read.
+/// Changes numbers or pixels in memory that the call reads.
 fn spoil<S: Source>(call: &mut Call, source: &mut S) -> bool {
     if call.inputs.is_empty() || !matches!(call.function, "vg_reconstruct" | "vg_gaussians_from_arrays") {
         return false;
@@ -430,7 +429,7 @@ fn spoil<S: Source>(call: &mut Call, source: &mut S) -> bool {
     true
 }
 
-/// Bytes of a picture from its first to its last pixel; `None` where the library must not look.
+/// Bytes of a picture from its first to its last pixel; `None` if the library must not read it.
 fn extent(width: u64, height: u64, stride: u64, format: u64) -> Option<(usize, usize, usize)> {
     let pixel = match format {
         1 | 2 => 3,
@@ -439,11 +438,11 @@ fn extent(width: u64, height: u64, stride: u64, format: u64) -> Option<(usize, u
         6 => 16,
         _ => return None,
     };
-    extent_of(width, height, stride, pixel)
+    pixel_extent(width, height, stride, pixel)
 }
 
-/// The same of pixels of so many bytes.
-fn extent_of(width: u64, height: u64, stride: u64, pixel: u64) -> Option<(usize, usize, usize)> {
+/// Bytes of a picture whose pixels have `pixel` bytes, from its first to its last pixel, as in [`extent`].
+fn pixel_extent(width: u64, height: u64, stride: u64, pixel: u64) -> Option<(usize, usize, usize)> {
     let side = 1..=8192;
     if !side.contains(&width) || !side.contains(&height) {
         return None;
@@ -454,7 +453,7 @@ fn extent_of(width: u64, height: u64, stride: u64, pixel: u64) -> Option<(usize,
     (stride >= row && len <= isize::MAX as u64).then_some((len as usize, row as usize, stride as usize))
 }
 
-/// Gives every picture of every view the memory that it claims.
+/// Allocates the memory of every picture of every view.
 fn back_views(call: &mut Call) {
     let at = call.position("views");
     let Value::Struct(lent) = &mut call.arguments[at].value else { return };
@@ -488,14 +487,14 @@ fn back_views(call: &mut Call) {
     }
 }
 
-/// Gives the targets of a picture the memory that they claim.
+/// Allocates the memory of the targets of a picture.
 fn back_target(call: &mut Call) {
     let at = call.position("target");
     let Value::Struct(lent) = &mut call.arguments[at].value else { return };
     if lent.stride < 72 {
         return;
     }
-    // What goes back has eight arrays first.
+    // Backward calls have eight arrays first.
     call.targets.truncate(if call.function == "vg_render" { 0 } else { 8 });
     for (part, shift) in [("color", 1), ("depth", 2), ("alpha", 3)] {
         if lent.get(0, part, 0) == 0 {
@@ -516,7 +515,7 @@ fn back_target(call: &mut Call) {
     }
 }
 
-/// Gives a gradient's planes, and the picture, the memory that they claim.
+/// Allocates the memory of a gradient's planes, and of the picture.
 fn back_gradients(call: &mut Call) {
     back_target(call);
     let at = call.position("gradient");
@@ -530,18 +529,18 @@ fn back_gradients(call: &mut Call) {
         }
         let [width, height, stride] =
             ["width", "height", &format!("{part}_row_stride")].map(|name| lent.get(0, name, 0));
-        let Some((len, ..)) = extent_of(width, height, stride, pixel) else { continue };
+        let Some((len, ..)) = pixel_extent(width, height, stride, pixel) else { continue };
         if len > MAX_BYTES {
             lent.put("height", 0, 0);
             continue;
         }
-        let mut memory = Memory::of(&calls::noise(len.div_ceil(4)), 1);
+        let mut memory = Memory::from_values(&calls::noise(len.div_ceil(4)), 1);
         lent.put(part, 0, memory.pointer() as u64);
         call.inputs.push(memory);
     }
 }
 
-/// Gives colours of a higher degree their memory.
+/// Allocates the memory of colours of a higher degree.
 fn back_arrays(call: &mut Call) {
     let at = call.position("arrays");
     let Value::Struct(lent) = &mut call.arguments[at].value else { return };
@@ -550,14 +549,14 @@ fn back_arrays(call: &mut Call) {
     }
     let degree = lent.get(0, "sh_degree", 0);
     if (1..=3).contains(&degree) && lent.get(0, "sh", 0) != 0 {
-        let mut memory = Memory::of(&vec![0.1f32; 3 * 3 * (degree as usize + 1).pow(2)], 0);
+        let mut memory = Memory::from_values(&vec![0.1f32; 3 * 3 * (degree as usize + 1).pow(2)], 0);
         lent.put("sh", 0, memory.pointer() as u64);
         call.inputs.push(memory);
     }
 }
 
 thread_local! {
-    /// After so many calls the progress callback says stop; 0: never.
+    /// Number of calls after which the progress callback cancels; 0: never.
     static STOP_IN: Cell<usize> = const { Cell::new(0) };
 }
 

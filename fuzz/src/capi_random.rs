@@ -1,7 +1,7 @@
 //! The target `capi` without libFuzzer: random calls for some time.
 //!
-//!     capi_random SECONDS SEED     prints how many calls came to what
-//!     capi_random = SEED           one execution again, by the number that a failure printed
+//!     capi_random SECONDS SEED     prints the number of calls per result
+//!     capi_random = SEED           repeats one execution, by the number that a failure printed
 
 #[path = "capi.rs"]
 mod capi;
@@ -30,7 +30,7 @@ fn main() {
     let seed: u64 = seed.parse().expect("a seed");
     let scratch = std::env::temp_dir().join(format!("capi_random-{}", std::process::id()));
     let world = capi::world(&scratch);
-    // A crash leaves here what it was.
+    // After a crash, this file has the number of the execution.
     let running = scratch.join("running");
     let mut results: BTreeMap<(&str, String), u64> = BTreeMap::new();
     let mut slowest = (Duration::ZERO, 0);
@@ -64,6 +64,6 @@ fn main() {
     println!("{executions} executions, {calls} calls, {failures} failures");
     println!("the slowest took {:?}: capi_random = {}", slowest.0, slowest.1);
     drop(world);
-    std::fs::remove_dir_all(&scratch).expect("the scratch folder goes");
+    std::fs::remove_dir_all(&scratch).expect("the scratch folder can be removed");
     std::process::exit(i32::from(failures > 0));
 }

@@ -48,7 +48,7 @@ MODELS = {  # name: (id, [(width, height, params)])
 
 
 def monotone(camera, xy):
-    """Does the distance from the principal point grow all the way out to the ray (x, y, 1)?"""
+    """Whether the distance from the principal point grows all the way out to the ray (x, y, 1)."""
     t = np.linspace(0, 1.02, 400)[:, None]
     pixels = camera.img_from_cam(np.concatenate([xy * t, np.ones_like(t)], 1))
     return bool((np.diff(np.linalg.norm(pixels - pixels[0], axis=1)) > 0).all())

@@ -1,4 +1,4 @@
-"""What the scripts in this folder share: where the numbers go and how they are written."""
+"""Code shared by the scripts in this folder: the output folder and the format of the numbers."""
 
 import json
 import sys

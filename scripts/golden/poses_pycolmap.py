@@ -1,4 +1,4 @@
-"""Poses: COLMAP's quaternion and translation as matrices, and the same pose as nerfstudio has it.
+"""Poses: COLMAP's quaternion and translation as matrices, and the same pose in nerfstudio's convention.
 
     python scripts/golden/poses_pycolmap.py tests/golden
 
@@ -18,7 +18,7 @@ def main():
     rng = np.random.default_rng(12)
     quaternions = rng.normal(size=(7, 4))
     quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
-    # No turn, half turns (w = 0) and a turn by 1e-7: where a conversion by cases goes wrong.
+    # No rotation, half turns (w = 0) and a rotation by 1e-7: cases where a conversion with branches goes wrong.
     special = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0.6, 0.8], [1, 5e-8, 0, 0]], float)
     poses = []
     for q in np.concatenate([quaternions, special]):

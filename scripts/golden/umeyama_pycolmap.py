@@ -1,8 +1,8 @@
-"""Similarity between point sets: what COLMAP estimates from noisy pairs, checked twice over.
+"""Similarity between point sets: COLMAP's estimate from noisy pairs, checked twice.
 
     python scripts/golden/umeyama_pycolmap.py tests/golden
 
-pycolmap.estimate_sim3d is the least-squares answer (Umeyama 1991), not a robust one. Before it is
+pycolmap.estimate_sim3d is the least-squares solution (Umeyama 1991), not a robust one. Before it is
 written it is compared with scikit-image's estimate and with the formula in this file.
 """
 

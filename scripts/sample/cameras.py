@@ -2,7 +2,7 @@
 
 Camera frame: x right, y down, z forward. The centre of the pixel in column u and row v is at
 (u + 0.5, v + 0.5), and cx, cy follow that convention (COLMAP's). The principal point is off the
-image centre and the cameras roll a little, so that a reader that ignores either is found out.
+image centre and the cameras roll a little, so that a reader that ignores either is detected.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ STATIONS = [
     (124.0, 6.20, 1.90, 0.3),
     (153.0, 6.30, 1.40, -0.4),
 ]
-# What each camera aims at: x, y, height over ground.
+# The target of each camera: x, y, height over ground.
 AIMS = [
     (0.10, 0.02, 0.62), (0.06, 0.00, 0.66), (-0.06, 0.03, 0.60), (-0.06, 0.00, 0.64),
     (0.10, 0.00, 0.63), (0.03, 0.02, 0.66), (-0.08, 0.00, 0.61), (-0.04, 0.02, 0.63),

@@ -1,4 +1,4 @@
-"""Checks the bundled sample against its mesh, with readers that are not the ones that wrote it.
+"""Checks the bundled sample against its mesh, with readers other than the code that wrote it.
 
     python scripts/sample/check_sedan.py tests/data/sedan
 

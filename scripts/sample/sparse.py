@@ -1,4 +1,4 @@
-"""The sparse model of the sample: surface points, their tracks, and the change of gauge."""
+"""The sparse model of the sample: surface points, their tracks, and the change of world frame."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-//! The types of every function and field, as the compiler wrote them down, against those of the first release.
+//! Compares the types of every function and field, from debug information, with those of the first release.
 
 use crate::abixml;
 use crate::symbols::declared;
@@ -21,8 +21,8 @@ fn abidiff_finds_nothing_that_would_break_a_program() {
     let mut abidw = Command::new("abidw");
     abidw.args(["--no-comp-dir-path", "--no-corpus-path", "--no-show-locs"]);
     run(abidw.arg("--out-file").arg(&dump).arg(library()));
-    let found = abixml::of_c_functions(&std::fs::read_to_string(&dump).unwrap());
-    // Without debug information there is nothing to compare, and abidiff is content.
+    let found = abixml::c_functions(&std::fs::read_to_string(&dump).unwrap());
+    // Without debug information abidiff has nothing to compare and reports no difference.
     for function in declared() {
         assert!(
             found.contains(&format!("mangled-name='{function}'")),
@@ -36,12 +36,12 @@ fn abidiff_finds_nothing_that_would_break_a_program() {
     }
     let today = folder.path().join("today.abi");
     std::fs::write(&today, found).unwrap();
-    // New functions are welcome.
+    // New functions are allowed.
     let result = output(Command::new("abidiff").arg("--no-added-syms").arg(&golden).arg(&today));
     assert_eq!(
         result.status.code(),
         Some(0),
-        "{}\nVG_BLESS=1 rewrites the golden file, for a change that old programs survive",
+        "{}\nVG_BLESS=1 rewrites the golden file, for a change that old programs still run with",
         String::from_utf8_lossy(&result.stdout)
     );
 }

@@ -1,9 +1,9 @@
-//! What of an `abidw` dump concerns the C functions: their declarations and every type that these lead to. The rest,
-//! twenty times as much, is about Rust's own types.
+//! The part of an `abidw` dump that concerns the C functions: their declarations and every type that they use. The
+//! rest, twenty times as much, describes Rust's own types.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// One element; `abidw` writes one tag a line.
+/// One element; `abidw` writes one tag per line.
 struct Node<'a> {
     open: &'a str,
     inside: Vec<Node<'a>>,
@@ -19,14 +19,14 @@ impl Node<'_> {
         self.is("function-decl") && self.open.contains("mangled-name='vg_")
     }
 
-    /// Holds declarations of several things.
-    fn is_shelf(&self) -> bool {
+    /// Whether this element only groups declarations.
+    fn is_group(&self) -> bool {
         self.is("abi-corpus") || self.is("abi-instr") || self.is("namespace-decl")
     }
 }
 
-/// The part of `dump` that is about the functions whose names begin with `vg_`, without paths of the machine.
-pub(crate) fn of_c_functions(dump: &str) -> String {
+/// The part of `dump` about the functions whose names begin with `vg_`, without paths of the machine.
+pub(crate) fn c_functions(dump: &str) -> String {
     let lines: Vec<&str> = dump.lines().filter(|line| !line.trim().is_empty()).collect();
     let (roots, _) = parse(&lines);
     let mut definitions = BTreeMap::new();
@@ -54,7 +54,7 @@ pub(crate) fn of_c_functions(dump: &str) -> String {
     out
 }
 
-/// Elements up to the line that closes their parent, and how many lines they are.
+/// Parses elements up to the line that closes their parent. Returns them and the number of their lines.
 fn parse<'a>(lines: &[&'a str]) -> (Vec<Node<'a>>, usize) {
     let mut nodes = Vec::new();
     let mut at = 0;
@@ -82,7 +82,7 @@ fn collect<'n, 'a>(
 ) {
     if node.is_function() {
         functions.push(node);
-    } else if node.is_shelf() {
+    } else if node.is_group() {
         node.inside.iter().for_each(|child| collect(child, definitions, functions));
     } else if let Some(id) = attributes(node.open, " id='").next() {
         definitions.entry(id).or_insert(node);
@@ -100,7 +100,7 @@ fn each_line<'a>(node: &Node<'a>, visit: &mut impl FnMut(&'a str)) {
 }
 
 fn write(node: &Node, needed: &BTreeSet<&str>, units: &mut usize, out: &mut String) {
-    if node.is_shelf() {
+    if node.is_group() {
         let mut inside = String::new();
         node.inside.iter().for_each(|child| write(child, needed, units, &mut inside));
         if inside.is_empty() {

@@ -1,4 +1,4 @@
-//! Alignment through the C functions has the bytes of the Rust library.
+//! Alignment through the C functions gives the bytes of the Rust library.
 
 use glam::DVec3;
 use std::ffi::CString;
@@ -11,21 +11,21 @@ use vg::scene::Cloud;
 use vg_face::capi::*;
 use vg_testing::boxes::{gauge, hatchback, scan, sparse, views};
 
-/// How a view says what is the vehicle.
+/// The source of a view's silhouette.
 #[derive(Clone, Copy, Debug)]
 enum Silhouette {
     /// A mask, and no photograph.
     Mask,
     /// A photograph's alpha, and no mask.
     Alpha,
-    /// A photograph that hides nothing, and no mask.
+    /// A photograph with full alpha, and no mask.
     Nothing,
 }
 
-/// Cameras and silhouettes in memory of the caller's.
+/// Cameras and silhouettes in the caller's memory.
 struct Lent {
     views: Vec<vg_view>,
-    /// What `views` point to.
+    /// The memory that `views` points to.
     _memory: (Vec<CString>, Vec<Vec<u8>>),
 }
 
@@ -67,7 +67,7 @@ fn lent(views: &[View], silhouette: impl Fn(usize) -> Silhouette) -> Lent {
     Lent { views: views.iter().enumerate().map(view).collect(), _memory: (names, pixels) }
 }
 
-/// The views that C reads: a pose that comes as numbers is made a rotation, exactly once.
+/// The views as C reads them: a pose passed as numbers is made a rotation exactly once.
 fn as_read(views: &[View]) -> Vec<View> {
     let read = |view: &View| {
         let mut view = view.clone();
@@ -78,7 +78,7 @@ fn as_read(views: &[View]) -> Vec<View> {
     views.iter().map(read).collect()
 }
 
-/// What C said, or the status and the words it failed with; then the result is as it was before.
+/// The result of C, or the status and message of its error; the output is then unchanged.
 fn through_c(
     call: impl FnOnce(*mut vg_alignment, *mut *mut vg_error) -> vg_status,
 ) -> Result<vg_alignment, String> {
@@ -113,7 +113,7 @@ fn assert_same(found: &vg_alignment, similarity: &Similarity, measures: [f64; 4]
     assert_eq!(found.used_count, used);
 }
 
-/// Two threads, which must make no difference.
+/// A context of two threads, which must make no difference.
 fn context() -> *mut vg_context {
     let mut context = null_mut();
     unsafe {
@@ -158,7 +158,7 @@ fn masks_and_alpha_give_the_alignment_of_rust_to_the_byte() {
             assert_same(&found, &expected.vehicle_from_world, measures, 8);
         }
     }
-    // What says nothing is left out, as long as enough is left.
+    // Views without a silhouette are left out, as long as enough remain.
     let some = |i: usize| if i < 5 { Silhouette::Nothing } else { Silhouette::Mask };
     let expected =
         align::to_scan(&views[5..], &ground, &Cloud::new(points.clone()).unwrap(), Heading::Auto).unwrap();
@@ -223,7 +223,7 @@ fn a_folder_gives_the_alignment_of_rust_to_the_byte() {
     assert_same(&found.unwrap(), &expected.vehicle_from_world, measures, 8);
 }
 
-/// What the sample's depth maps show of the right side, and its mirror image.
+/// Writes the points of the sample's depth maps of the right side, and their mirror image.
 fn write_scan(sample: &Path, file: &Path) {
     let scene = vg::io::open_scene(sample, &vg::io::SceneOptions::default()).unwrap().scene;
     let mut points = Vec::new();

@@ -1,5 +1,5 @@
-//! What the functions do with NULL, zero, bad numbers and sizes: a table of calls, each with one thing that is wrong
-//! or unusual. `calls` has the functions and their arguments; what holds for every call is checked there.
+//! Behaviour of the functions with NULL, zero, bad numbers and sizes: a table of calls, each with one wrong or unusual
+//! argument. `calls` has the functions and their arguments, and checks the promises that hold for every call.
 #![allow(unsafe_code)]
 
 use crate::symbols::declared;
@@ -17,14 +17,14 @@ use vg_testing::vehicle;
 
 mod calls;
 
-/// Bytes on either side of everything that is lent.
+/// Guard bytes on either side of all lent memory.
 pub(crate) const GUARD: usize = 64;
 
-/// What a row expects.
+/// The expected result of a row.
 #[derive(Clone, Debug)]
 enum Expect {
     Fine,
-    /// `VG_STATUS_ARGUMENT`, and these words.
+    /// `VG_STATUS_ARGUMENT`, and this text in the message.
     Refused(String),
     Fails(vg_status, String),
 }
@@ -34,7 +34,7 @@ fn refused(words: &str) -> Expect {
     Expect::Refused(words.into())
 }
 
-/// The rows and what they are run in.
+/// The rows, and the world in which they run.
 struct Table {
     world: World,
     rows: usize,
@@ -53,7 +53,7 @@ impl Table {
         Self { world, rows: 0, functions: BTreeSet::new(), _folder: folder }
     }
 
-    /// Makes a call twice, with an `out_error` and without.
+    /// Makes a call twice, with `out_error` and without.
     #[track_caller]
     fn row(
         &mut self,
@@ -95,7 +95,7 @@ impl Table {
         done
     }
 
-    /// What can be said of any argument by its kind.
+    /// Adds the rows that follow from the kind of an argument.
     fn generic_rows(&mut self, make: fn(&World) -> Call) {
         self.row(make, "as it is", |_| {}, Fine);
         let valid = make(&self.world);
@@ -172,10 +172,10 @@ impl Table {
                 let what = format!("{name}.{}[{k}] = {bits:#x}", field.name);
                 let words = [element.as_str(), field.word.as_str()].into_iter().filter(|w| !w.is_empty());
                 let words = words.collect::<Vec<_>>().join(".");
-                // `target.size` is called so in full.
+                // The error has the full name `target.size`.
                 let words = if field.word.starts_with(name) { field.word.clone() } else { words };
                 let set = |call: &mut Call| call.lent(name).put(&field.name, k, bits);
-                // Reserved numbers are told by their array.
+                // The error for a reserved number names its array.
                 self.row(make, &what, set, expected(outcome, words));
             }
         }
@@ -196,10 +196,10 @@ fn expected(outcome: Outcome, words: String) -> Expect {
     }
 }
 
-/// Functions that fill a struct as far as it says it goes.
+/// Functions that fill a struct up to its `struct_size`.
 const SIZED: [&str; 2] = ["vg_report_get_figures", "vg_scene_get_view"];
 
-/// Functions that cannot fail, all called by `what_cannot_fail_accepts_null`.
+/// Functions that cannot fail, all called by `functions_that_cannot_fail_accept_null`.
 const NEVER_FAIL: [&str; 30] = [
     "vg_version",
     "vg_abi_version",
@@ -246,7 +246,7 @@ fn every_argument_and_field_of_every_function_is_checked() {
 }
 
 #[test]
-fn what_cannot_fail_accepts_null() {
+fn functions_that_cannot_fail_accept_null() {
     unsafe {
         assert_eq!(CStr::from_ptr(vg_version()).to_str(), Ok(env!("CARGO_PKG_VERSION")));
         assert_eq!(vg_abi_version(), VG_ABI_VERSION);
@@ -285,7 +285,7 @@ fn what_cannot_fail_accepts_null() {
 }
 
 #[test]
-fn init_functions_fill_what_they_are_told_and_nothing_beyond() {
+fn init_functions_fill_struct_size_bytes_and_none_beyond() {
     let mut table = Table::new();
     for make in calls::CALLS {
         let valid = make(&table.world);
@@ -323,7 +323,7 @@ fn init_functions_fill_what_they_are_told_and_nothing_beyond() {
     }
 }
 
-/// Copies of [`IDENTITY`] that are no rotations.
+/// Modified copies of [`IDENTITY`] that are not rotations.
 fn no_rotations() -> [[f64; 12]; 5] {
     let change = |entries: &[(usize, f64)]| {
         let mut pose = IDENTITY;
@@ -341,7 +341,7 @@ fn no_rotations() -> [[f64; 12]; 5] {
 
 const IDENTITY: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
-/// 4x4 matrices that are no similarities.
+/// 4x4 matrices that are not similarities.
 fn no_similarities() -> Vec<[f64; 16]> {
     let mut all: Vec<[f64; 16]> = Vec::new();
     for pose in no_rotations() {
@@ -364,7 +364,7 @@ fn no_similarities() -> Vec<[f64; 16]> {
 }
 
 #[test]
-fn mirrors_scales_and_shears_are_no_poses() {
+fn mirrors_scales_and_shears_are_not_poses() {
     let mut table = Table::new();
     for pose in no_rotations() {
         let what = format!("pose {pose:?}");
@@ -406,7 +406,7 @@ fn mirrors_scales_and_shears_are_no_poses() {
         }
         for make in [calls::colmap_open as fn(&World) -> Call, calls::transforms_open] {
             let point = |call: &mut Call| {
-                let mut memory = Memory::of(&matrix, 1);
+                let mut memory = Memory::from_values(&matrix, 1);
                 call.lent("options").put("vehicle_from_world", 0, memory.pointer() as u64);
                 call.inputs.push(memory);
             };
@@ -420,7 +420,7 @@ fn mirrors_scales_and_shears_are_no_poses() {
 }
 
 #[test]
-fn numbers_that_overflow_are_refused_and_not_handed_out() {
+fn numbers_that_overflow_are_refused_and_not_returned() {
     let mut table = Table::new();
     let far = 1.7e308;
     let tvec = |call: &mut Call| call.doubles("tvec").fill(far);
@@ -440,7 +440,7 @@ fn numbers_that_overflow_are_refused_and_not_handed_out() {
         point(values)(&mut call);
         call.run(true);
     }
-    // The camera looks from (distance cos, distance sin) at the middle: twice that is behind it.
+    // The camera looks from (distance cos, distance sin) at the middle: twice the middle is behind it.
     table.row(calls::camera_project, "behind", point([10.0, -10.0, 1.6]), refused("point_vehicle"));
     let at = vehicle::camera(-40.0, 6.5, 4, 4).center();
     table.row(calls::camera_project, "on the plane", point(at.to_array()), refused("point_vehicle"));
@@ -469,7 +469,7 @@ fn numbers_that_overflow_are_refused_and_not_handed_out() {
     }
 }
 
-/// `f64`s of an out array after a call that worked.
+/// `f64`s of an out array after a successful call.
 fn numbers(done: &Done, argument: usize) -> Vec<f64> {
     done.memory[argument].as_ref().expect("memory").doubles()
 }
@@ -484,7 +484,7 @@ fn points_without_a_pixel_and_pixels_without_a_point_are_nan_between_the_others(
     let given = [[0.5, -0.25, 0.5], behind.to_array(), odd, [-1.0, 0.25, 0.0]];
     call.set("points", Value::Doubles(given.concat()));
     call.set("count", Value::Number(4));
-    // Room that holds no finite numbers is not the table's kind of argument.
+    // Memory with numbers that are not finite does not fit the table's kinds of argument.
     let (mut pixels, mut depths) = ([7.0f64; 8], [7.0f64; 4]);
     call.set("out_pixels", Value::Handle(pixels.as_mut_ptr().expose_provenance()));
     call.set("out_depths", Value::Handle(depths.as_mut_ptr().expose_provenance()));
@@ -507,11 +507,11 @@ fn points_without_a_pixel_and_pixels_without_a_point_are_nan_between_the_others(
 }
 
 #[test]
-fn indices_and_files_in_memory_are_checked_to_the_last() {
+fn every_index_and_every_file_in_memory_is_checked() {
     let mut table = Table::new();
     let indices = |values: [usize; 4]| {
         move |call: &mut Call| {
-            let mut memory = Memory::of(&values, 0);
+            let mut memory = Memory::from_values(&values, 0);
             call.set("indices", Value::Handle(memory.pointer()));
             call.inputs.push(memory);
         }
@@ -540,7 +540,7 @@ fn indices_and_files_in_memory_are_checked_to_the_last() {
 }
 
 #[test]
-fn cameras_of_every_model_are_read_with_as_many_numbers_as_the_model_has() {
+fn cameras_of_every_model_are_read_with_the_number_of_parameters_of_the_model() {
     let mut table = Table::new();
     for (model, count) in [(0, 3), (1, 4), (2, 4), (3, 5), (4, 8), (5, 8), (6, 12)] {
         let params: Vec<f64> = [50.0, 50.0, 24.0, 18.0].into_iter().chain([1e-3; 8]).take(count).collect();
@@ -582,7 +582,7 @@ fn cameras_of_every_model_are_read_with_as_many_numbers_as_the_model_has() {
 }
 
 #[test]
-fn distortion_comes_in_opencv_s_lengths() {
+fn distortion_has_the_lengths_that_opencv_allows() {
     let mut table = Table::new();
     for count in 0..16usize {
         for fisheye in [0, 1] {
@@ -620,13 +620,13 @@ fn distortion_comes_in_opencv_s_lengths() {
             refused("camera"),
         );
     }
-    // `double *` that is none.
+    // A `double *` that is NULL.
     for (make, name) in [
         (calls::camera_from_opencv as fn(&World) -> Call, "distortion"),
         (calls::camera_from_colmap_model, "params"),
     ] {
         let odd = |call: &mut Call| {
-            let mut memory = Memory::of(&[50.0f64, 50.0, 24.0, 18.0], 4);
+            let mut memory = Memory::from_values(&[50.0f64, 50.0, 24.0, 18.0], 4);
             call.set(name, Value::Handle(memory.pointer()));
             call.inputs.push(memory);
         };
@@ -638,7 +638,7 @@ const ARRAYS: [(&str, usize); 5] =
     [("positions", 3), ("scales", 3), ("rotations", 4), ("opacities", 1), ("sh", 3)];
 
 #[test]
-fn arrays_of_gaussians_are_checked_to_the_last_number() {
+fn every_number_of_arrays_of_gaussians_is_checked() {
     let mut table = Table::new();
     let make = calls::gaussians_from_arrays;
     let empty = |call: &mut Call| {
@@ -652,14 +652,14 @@ fn arrays_of_gaussians_are_checked_to_the_last_number() {
         table.row(make, &format!("{name} NULL"), |call| call.lent("arrays").put(name, 0, 0), refused(&words));
         for shift in [1, 2, 3] {
             let odd = |call: &mut Call| {
-                let mut memory = Memory::of(FEW[which], shift);
+                let mut memory = Memory::from_values(FEW[which], shift);
                 call.lent("arrays").put(name, 0, memory.pointer() as u64);
                 call.inputs.push(memory);
             };
             table.row(make, &format!("{name} off by {shift}"), odd, refused(&words));
         }
         let only_aligned_to_floats = |call: &mut Call| {
-            let mut memory = Memory::of(FEW[which], 4);
+            let mut memory = Memory::from_values(FEW[which], 4);
             call.lent("arrays").put(name, 0, memory.pointer() as u64);
             call.inputs.push(memory);
         };
@@ -669,7 +669,7 @@ fn arrays_of_gaussians_are_checked_to_the_last_number() {
                 let spoilt = |call: &mut Call| {
                     let mut values = FEW[which].to_vec();
                     values[i * each + each - 1] = bad;
-                    let mut memory = Memory::of(&values, 0);
+                    let mut memory = Memory::from_values(&values, 0);
                     call.lent("arrays").put(name, 0, memory.pointer() as u64);
                     call.inputs.push(memory);
                 };
@@ -681,7 +681,7 @@ fn arrays_of_gaussians_are_checked_to_the_last_number() {
         move |call: &mut Call| {
             let mut values = FEW[which].to_vec();
             values[k] = value;
-            let mut memory = Memory::of(&values, 0);
+            let mut memory = Memory::from_values(&values, 0);
             call.lent("arrays").put(ARRAYS[which].0, 0, memory.pointer() as u64);
             call.inputs.push(memory);
         }
@@ -694,7 +694,7 @@ fn arrays_of_gaussians_are_checked_to_the_last_number() {
     table.row(make, "far away", with(0, 0, 3e38), Fine);
     for degree in 0..4usize {
         let more = |call: &mut Call| {
-            let mut memory = Memory::of(&vec![0.25f32; 3 * 3 * (degree + 1) * (degree + 1)], 0);
+            let mut memory = Memory::from_values(&vec![0.25f32; 3 * 3 * (degree + 1) * (degree + 1)], 0);
             call.lent("arrays").put("sh", 0, memory.pointer() as u64);
             call.lent("arrays").put("sh_degree", 0, degree as u64);
             call.inputs.push(memory);
@@ -721,7 +721,7 @@ fn handle(call: &Call) -> usize {
 }
 
 #[test]
-fn files_that_are_not_there_or_not_what_they_should_be_are_told_by_path() {
+fn missing_and_malformed_files_are_errors_that_name_the_path() {
     let mut table = Table::new();
     let folder = table.world.scratch.clone();
     let junk = folder.join("junk.ply");
@@ -779,7 +779,7 @@ fn files_that_are_not_there_or_not_what_they_should_be_are_told_by_path() {
 }
 
 #[test]
-fn photographs_without_masks_are_checked_before_the_network_is_asked_for() {
+fn photographs_without_masks_are_checked_before_the_network_is_required() {
     let mut table = Table::new();
     let make = calls::segment;
     let image = |change: fn(&mut vg_image)| {
@@ -787,7 +787,7 @@ fn photographs_without_masks_are_checked_before_the_network_is_asked_for() {
             let Value::Handle(at) = call.arguments[1].value else { panic!("a picture") };
             let mut image = unsafe { std::ptr::with_exposed_provenance::<vg_image>(at).read_unaligned() };
             change(&mut image);
-            let mut memory = Memory::of(&[image], 1);
+            let mut memory = Memory::from_values(&[image], 1);
             call.set("image", Value::Handle(memory.pointer()));
             call.inputs.push(memory);
         }
@@ -807,7 +807,7 @@ fn photographs_without_masks_are_checked_before_the_network_is_asked_for() {
     table.row(make, "no model", |_| {}, Fails(status, words.into()));
 }
 
-/// A handle of no Gaussians.
+/// A handle of zero Gaussians.
 fn nothing() -> usize {
     use std::sync::OnceLock;
     static NOTHING: OnceLock<usize> = OnceLock::new();
@@ -821,7 +821,7 @@ fn nothing() -> usize {
 }
 
 #[test]
-fn scenes_are_opened_by_names_that_are_there() {
+fn scenes_are_opened_by_the_names_of_existing_views() {
     let mut table = Table::new();
     for make in [calls::colmap_open as fn(&World) -> Call, calls::transforms_open] {
         let names = |names: &'static [Option<&'static [u8]>], count: usize| {
@@ -836,7 +836,7 @@ fn scenes_are_opened_by_names_that_are_there() {
                     pointers.push(memory.pointer());
                     call.inputs.push(memory);
                 }
-                let mut list = Memory::of(&pointers, 0);
+                let mut list = Memory::from_values(&pointers, 0);
                 let pointer = if names.is_empty() { 0 } else { list.pointer() };
                 call.lent("options").put("names", 0, pointer as u64);
                 call.lent("options").put("name_count", 0, count as u64);
@@ -856,7 +856,7 @@ fn scenes_are_opened_by_names_that_are_there() {
         );
         table.row(make, "an empty name", names(&[Some(b"\0")], 1), Fails(vg_status::Argument, String::new()));
         let odd = |call: &mut Call| {
-            let mut list = Memory::of(&[0usize], 4);
+            let mut list = Memory::from_values(&[0usize], 4);
             call.lent("options").put("names", 0, list.pointer() as u64);
             call.inputs.push(list);
         };
@@ -867,7 +867,7 @@ fn scenes_are_opened_by_names_that_are_there() {
     }
     let unplaced = |call: &mut Call| call.lent("options").put("vehicle_from_world", 0, 0);
     table.row(calls::transforms_open, "the world is the vehicle's frame", unplaced, Fine);
-    // The model is what is not complete.
+    // The model is incomplete.
     let incomplete = Fails(vg_status::Format, "vehicle_from_world".into());
     table.row(calls::colmap_open, "a world that lies anywhere", unplaced, incomplete);
     let sample = text(&table.world.sample);
@@ -878,7 +878,7 @@ fn scenes_are_opened_by_names_that_are_there() {
         Fine,
     );
 
-    // What a scene lends can be lent again.
+    // Views from a scene can be passed in again.
     let done = table.row(calls::scene_get_view, "index 1", |_| {}, Fine);
     let memory = done.memory[2].as_ref().unwrap();
     let view = unsafe { memory.content().as_ptr().cast::<vg_view>().read_unaligned() };
@@ -891,7 +891,7 @@ fn scenes_are_opened_by_names_that_are_there() {
     unsafe { vg_gaussians_free(gaussians) };
 }
 
-/// Bytes of all arrays.
+/// The bytes of all arrays.
 fn bytes(gaussians: usize) -> Vec<u8> {
     let gaussians = gaussians as *const vg_gaussians;
     unsafe {
@@ -939,11 +939,11 @@ fn views_of_a_newer_program_give_the_same_bytes() {
         let at = call.lent("views").bytes.len() - 1;
         call.lent("views").bytes[at] = 1;
     };
-    table.row(make, "a number that nobody knows", last, refused("views[3]"));
+    table.row(make, "an unknown number", last, refused("views[3]"));
 }
 
 #[test]
-fn views_that_make_no_vehicle_are_told_by_index() {
+fn views_without_a_vehicle_are_errors_that_name_the_index() {
     let mut table = Table::new();
     let make = calls::reconstruct;
     let null = |field: &'static str| move |call: &mut Call| call.lent("views").put_in(1, field, 0, 0);
@@ -959,7 +959,7 @@ fn views_that_make_no_vehicle_are_told_by_index() {
             call.lent("views").put(&format!("{part}.row_stride"), 0, 0);
         }
     };
-    // Other pixels than those meant, but there they are.
+    // Other pixels than the intended ones, but valid memory.
     table.row(make, "no strides", tight, Fine);
 
     let name = |name: &'static [u8]| {
@@ -992,11 +992,11 @@ fn views_that_make_no_vehicle_are_told_by_index() {
     };
     table.row(make, "depth that was not given", given, refused("views[2]"));
 
-    // Depth that is none: every pixel NaN, infinite or negative.
+    // Depth without a measurement: every pixel NaN, infinite or negative.
     for bad in [f32::NAN, f32::INFINITY, -1.0, 0.0, f32::MAX, f32::from_bits(1)] {
         let spoilt = |call: &mut Call| {
             for i in 0..4 {
-                let mut memory = Memory::of(&[bad; 48 * 36], 0);
+                let mut memory = Memory::from_values(&[bad; 48 * 36], 0);
                 call.lent("views").put_in(i, "depth.data", 0, memory.pointer() as u64);
                 call.lent("views").put_in(i, "depth.row_stride", 0, 0);
                 call.inputs.push(memory);
@@ -1045,7 +1045,7 @@ fn views_that_make_no_vehicle_are_told_by_index() {
 }
 
 #[test]
-fn cameras_that_stand_anywhere_make_finite_numbers_or_none() {
+fn cameras_at_any_position_give_finite_numbers_or_an_error() {
     let table = Table::new();
     for far in [1e4, 1e6, 1e10, 1e19, 1e30, 1e39, 1e150, 1e300, 1.7e308] {
         for (prior, views) in [(1, 0..1), (1, 0..4), (2, 0..1), (2, 0..4)] {
@@ -1132,13 +1132,13 @@ fn pictures_are_written_in_every_format_at_any_address_and_only_there() {
     table.row(make, "far before near", close, refused("options.far_plane"));
 }
 
-/// What a call that goes back wrote: arrays first, then pictures.
+/// Output of a backward call: arrays first, then pictures.
 fn written(call: &Call) -> Vec<Vec<u8>> {
     call.targets.iter().map(|target| target.memory.content().to_vec()).collect()
 }
 
 #[test]
-fn gradients_go_where_they_are_wanted_and_nowhere_else() {
+fn gradients_are_written_to_the_requested_arrays_and_nowhere_else() {
     let mut table = Table::new();
     let make = calls::render_backward;
     let mut whole = make(&table.world);
@@ -1151,7 +1151,7 @@ fn gradients_go_where_they_are_wanted_and_nowhere_else() {
         for other in arrays.iter().filter(|other| **other != wanted) {
             call.lent("out").put(other, 0, 0);
         }
-        // Of the camera and the background alone, the number of Gaussians does not matter.
+        // For gradients of only the camera and the background, the number of Gaussians does not matter.
         if i >= 5 {
             call.lent("out").put("count", 0, 0);
             call.lent("out").put("sh_degree", 0, 77);
@@ -1176,7 +1176,7 @@ fn gradients_go_where_they_are_wanted_and_nowhere_else() {
 }
 
 #[test]
-fn planes_of_a_gradient_are_read_in_place_and_their_numbers_are_finite() {
+fn planes_of_a_gradient_are_read_in_place_and_must_be_finite() {
     let mut table = Table::new();
     let make = calls::render_backward;
     let planes = [("color", 12), ("alpha", 4), ("depth", 4)];
@@ -1196,7 +1196,7 @@ fn planes_of_a_gradient_are_read_in_place_and_their_numbers_are_finite() {
         }
         let without = |call: &mut Call| call.lent("gradient").put(plane, 0, 0);
         table.row(make, &format!("no {plane}"), without, Fine);
-        // A row without gaps and one with some hold the same gradient.
+        // Rows with and without gaps hold the same gradient.
         let mut expected = make(&table.world);
         let only = |call: &mut Call| {
             planes.iter().filter(|p| p.0 != plane).for_each(|p| call.lent("gradient").put(p.0, 0, 0));
@@ -1232,15 +1232,15 @@ fn planes_of_a_gradient_are_read_in_place_and_their_numbers_are_finite() {
     table.row(make, "straight alpha without colour", without_color, Fine);
 }
 
-/// What a loss in C would have at hand.
+/// The user data of a loss in C.
 struct Loss {
     world: *const World,
     caller: std::thread::ThreadId,
-    /// The planes it fills, with what.
+    /// The planes that it fills, and their contents.
     planes: [(*mut u8, Vec<u8>); 3],
     answer: i32,
     calls: usize,
-    /// What `target` held when it was called.
+    /// Contents of `target` at the time of the call.
     picture: Vec<u8>,
     target: (*const u8, usize),
 }
@@ -1253,7 +1253,7 @@ unsafe extern "C" fn loss(user: *mut c_void) -> i32 {
     for (plane, bytes) in &loss.planes {
         unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), *plane, bytes.len()) };
     }
-    // With the same context, of which every thread waits.
+    // Uses the same context, while all of its threads wait.
     for make in [calls::render as fn(&World) -> Call, calls::render_backward_with_a_picture] {
         assert!(make(unsafe { &*loss.world }).run(true).is_ok());
     }
@@ -1261,7 +1261,7 @@ unsafe extern "C" fn loss(user: *mut c_void) -> i32 {
 }
 
 #[test]
-fn a_loss_sees_the_picture_fills_the_planes_and_may_call_the_library() {
+fn a_loss_gets_the_picture_fills_the_planes_and_may_call_the_library() {
     let mut table = Table::new();
     let one = {
         let mut call = calls::context_new(&table.world);
@@ -1281,7 +1281,7 @@ fn a_loss_sees_the_picture_fills_the_planes_and_may_call_the_library() {
         for (answer, spoiled) in [(0, false), (1, false), (i32::MIN, false), (0, true)] {
             let mut call = make(&table.world);
             call.lent("options").put("context", 0, context as u64);
-            // The planes hold noise until the loss has filled them.
+            // The planes contain noise until the loss fills them.
             let contents: Vec<Vec<u8>> = call.inputs.iter().map(|input| input.content().to_vec()).collect();
             let mut planes: Vec<Vec<u8>> = contents.iter().map(|c| vec![0xFF; c.len()]).collect();
             let names = ["color", "alpha", "depth"];
@@ -1306,11 +1306,11 @@ fn a_loss_sees_the_picture_fills_the_planes_and_may_call_the_library() {
             };
             call.lent("gradient").put("loss", 0, loss as *const () as u64);
             call.lent("gradient").put("loss_user", 0, (&raw mut user).expose_provenance() as u64);
-            // The picture was written before the loss could fail: that is promised, and not that it was not.
+            // The picture is written before the loss can fail, so the check for untouched outputs excludes it.
             let pictures = if answer != 0 || spoiled { call.targets.split_off(8) } else { vec![] };
             let done = call.run(true);
             assert_eq!(user.calls, 1);
-            assert!(user.picture == written(&drawn)[0], "the picture was there");
+            assert!(user.picture == written(&drawn)[0], "the loss gets the picture");
             match (answer, spoiled) {
                 (0, false) => {
                     assert!(done.is_ok(), "{}", done.message);
@@ -1384,7 +1384,7 @@ fn a_callback_may_stop_at_any_of_its_calls() {
                 Fails(vg_status::Cancelled, "cancelled".into()),
             );
         }
-        // The context is as good as it was.
+        // The context still works.
         CALLS_LEFT.set(usize::MAX);
         let mut call = calls::reconstruct(&table.world);
         with(&mut call);
@@ -1394,7 +1394,7 @@ fn a_callback_may_stop_at_any_of_its_calls() {
 }
 
 #[test]
-fn depth_of_a_thousand_metres_is_told_to_the_log_and_nobody_else() {
+fn depth_of_a_thousand_metres_is_a_warning_of_the_log_only() {
     let mut table = Table::new();
     for make in [calls::colmap_open as fn(&World) -> Call, calls::transforms_open] {
         LINES.with_borrow_mut(Vec::clear);
@@ -1406,12 +1406,12 @@ fn depth_of_a_thousand_metres_is_told_to_the_log_and_nobody_else() {
         let lines = LINES.take();
         assert!(lines.iter().any(|line| line.contains("depth")), "{lines:?}");
         let unheard = |call: &mut Call| call.lent("options").put("depth_scale", 0, 1.0f64.to_bits());
-        table.row(make, "nobody listens", unheard, Fine);
+        table.row(make, "no log function", unheard, Fine);
     }
 }
 
 #[test]
-fn figures_tell_the_prior_and_its_box() {
+fn figures_contain_the_prior_and_its_box() {
     let mut table = Table::new();
     for (prior, has_box) in [(vg_prior::Given, 0), (vg_prior::Hull, 1), (vg_prior::Shape, 1)] {
         let choose = |call: &mut Call| call.lent("options").put("prior", 0, prior as u64);
@@ -1430,7 +1430,7 @@ fn figures_tell_the_prior_and_its_box() {
         assert!(figures.uncovered_after <= figures.uncovered_before && figures.uncovered_before < 1.0);
         assert_eq!(figures.cloud_used, 0);
 
-        // The report has the same.
+        // The report has the same numbers.
         let told = report(made.handle("out_report"));
         assert_eq!(figures.photo_found, told["photo"]["found"].as_u64().unwrap_or(0));
         assert_eq!(figures.relit_count, told["relight"]["clones"].as_u64().unwrap_or(0));
@@ -1485,14 +1485,14 @@ fn report(handle: usize) -> serde_json::Value {
     serde_json::from_str(json.to_str().unwrap()).unwrap()
 }
 
-/// A program of the first header has none of the fields that came later.
+/// A program of the first header has none of the later fields.
 #[test]
-fn options_of_an_older_program_have_the_defaults_of_what_came_later() {
+fn options_of_an_older_program_have_the_defaults_of_later_fields() {
     let mut table = Table::new();
     let make = calls::reconstruct;
     let expected = bytes(table.row(make, "as it is", |_| {}, Fine).handle("out_gaussians"));
     let first = FIRST_SIZES.iter().find(|(of, _)| *of == "vg_options").unwrap().1;
-    // Up to the reserved field, to the middle of the cloud, to the resolution and behind it.
+    // Sizes up to the reserved field, the middle of the cloud, the resolution, and beyond it.
     for size in [first, first + 8, first + 12, first + 16, first + 24, first + 36, first + 40, first + 48] {
         let older = |call: &mut Call| {
             call.lent("options").put("photo", 0, if size > first + 8 { 1 } else { 77 });
@@ -1525,7 +1525,7 @@ fn options_reach_the_library() {
     let told = report(done.handle("out_report"));
     let settings = &told["settings"];
     assert_eq!((settings["calibrate"].as_str(), settings["relight"].as_str()), (Some("off"), Some("never")));
-    // The plan of a budget is told beside the settings that it chose.
+    // The report has the plan of a budget next to the settings that it chose.
     assert_eq!((settings["photo"].as_bool(), told["plan"]["budget_s"].as_f64()), (Some(false), Some(1e6)));
     assert!(told["calibration"].is_null() && told["relight"].is_null());
     assert_eq!((settings["resolution"].as_f64(), settings["max_views"].as_u64()), (Some(0.5), Some(1)));
@@ -1535,10 +1535,10 @@ fn options_reach_the_library() {
 }
 
 #[test]
-fn a_cloud_is_read_to_its_last_number_and_copied() {
+fn a_cloud_is_read_completely_and_copied() {
     let mut table = Table::new();
     let make = calls::reconstruct;
-    // Points of the right side, where the depth has them.
+    // Points of the right side at the measured depth.
     let points = unsafe {
         let count = vg_report_point_count(table.world.report as _);
         std::slice::from_raw_parts(vg_report_point_positions(table.world.report as _), 3 * count)
@@ -1548,7 +1548,7 @@ fn a_cloud_is_read_to_its_last_number_and_copied() {
     assert!(count > 50, "{count} points");
     let lend = |values: Vec<f32>, count: usize, prior: vg_prior| {
         move |call: &mut Call| {
-            let mut memory = Memory::of(&values, 0);
+            let mut memory = Memory::from_values(&values, 0);
             call.lent("options").put("cloud", 0, memory.pointer() as u64);
             call.lent("options").put("cloud_count", 0, count as u64);
             call.lent("options").put("prior", 0, prior as u64);
@@ -1592,7 +1592,7 @@ fn a_cloud_is_read_to_its_last_number_and_copied() {
     table.row(make, "points that are nowhere near", far, Fine);
 }
 
-/// What a callback that calls the library is told.
+/// User data of a callback that calls the library.
 struct Inner {
     world: *const World,
     depth: Cell<u32>,
@@ -1610,7 +1610,7 @@ unsafe fn call_again(user: *mut c_void) {
     for make in [calls::render as fn(&World) -> Call, calls::render_through_a_lens, calls::gaussians_mirror] {
         assert!(make(world).run(true).is_ok());
     }
-    // An error of the inner call is its own.
+    // The inner call has an error of its own.
     assert_eq!(unsafe { vg_gaussians_mirror(null(), null_mut(), null_mut()) }, vg_status::Argument);
     let mut call = calls::reconstruct(world);
     call.lent("options").put("progress", 0, again as *const () as u64);
@@ -1660,7 +1660,7 @@ fn many_threads_in_one_context_get_the_same_bytes() {
     let (straight, bent) = (picture(calls::render), picture(calls::render_through_a_lens));
     let (back, bent_back) =
         (picture(calls::render_backward_with_a_picture), picture(calls::render_backward_through_a_lens));
-    // The world is handles, which any number of threads may use.
+    // The world consists of handles, which any number of threads may use.
     struct Shared<'a>(&'a World);
     unsafe impl Sync for Shared<'_> {}
     impl Shared<'_> {
@@ -1693,7 +1693,7 @@ fn many_threads_in_one_context_get_the_same_bytes() {
             });
         }
     });
-    // Another context, and none, give the same.
+    // Another context, and no context, give the same bytes.
     for threads in [1, 3, 16] {
         let mut call = calls::context_new(world);
         call.lent("options").put("threads", 0, threads);
@@ -1714,8 +1714,8 @@ fn threads() -> usize {
     std::fs::read_dir("/proc/self/task").unwrap().count()
 }
 
-/// Threads of this process, once those that have ended are off the system's list: a thread that was joined runs
-/// nothing any more, but is listed until the kernel has buried it. One that lives on is still there at the end.
+/// Threads of this process, once those that have ended are off the system's list: a joined thread no longer runs, but
+/// is listed until the kernel has removed it. A thread that still runs stays on the list.
 #[cfg(target_os = "linux")]
 fn threads_left(expected: usize) -> usize {
     let start = std::time::Instant::now();
@@ -1785,7 +1785,7 @@ fn alone_one_thread_is_the_calling_one() {
     let words = "threads: 0 of 2 could be started: Resource temporarily unavailable (os error 11); raise the system's \
                  limit of threads (ulimit -u), or ask for 1, which starts none";
     table.row(calls::context_new, "two threads", two, Fails(vg_status::Threads, words.into()));
-    // One core is one thread, which is there.
+    // One core needs one thread, which is the calling one.
     let cores = std::thread::available_parallelism().unwrap().get();
     let words = format!("threads: 0 of {cores} could be started");
     let expect = if cores == 1 { Fine } else { Fails(vg_status::Threads, words) };
@@ -1806,8 +1806,8 @@ fn a_context_of_one_thread_works_where_no_thread_can_be_started() {
     let name = "arguments::alone_one_thread_is_the_calling_one";
     command.args(["--exact", name, "--ignored", "--test-threads=1"]);
     command.env("LD_PRELOAD", vg_testing::tools::few_threads(folder.path())).env("VG_TEST_THREADS", "0");
-    let said = vg_testing::tools::run(&mut command);
-    assert!(said.contains("1 passed"), "{said}");
+    let output = vg_testing::tools::run(&mut command);
+    assert!(output.contains("1 passed"), "{output}");
 }
 
 #[cfg(target_os = "linux")]
@@ -1815,18 +1815,18 @@ fn a_context_of_one_thread_works_where_no_thread_can_be_started() {
 fn threads_end_with_their_context_or_call() {
     let mut command = std::process::Command::new(std::env::current_exe().unwrap());
     let name = "arguments::alone_threads_end_with_their_context";
-    let said = vg_testing::tools::run(command.args(["--exact", name, "--ignored", "--test-threads=1"]));
-    assert!(said.contains("1 passed"), "{said}");
+    let output = vg_testing::tools::run(command.args(["--exact", name, "--ignored", "--test-threads=1"]));
+    assert!(output.contains("1 passed"), "{output}");
 }
 
-/// What an uninitialised variable may hold.
+/// A possible value of an uninitialised variable.
 fn garbage<T>() -> *mut T {
     std::ptr::without_provenance_mut(0xDEAD_BEE0)
 }
 
 #[test]
 fn handles_of_failed_calls_are_null_and_made_ones_are_freed() {
-    // `Call::run` hands in a pointer to nowhere; here, what a caller has in its variable.
+    // `Call::run` passes a dangling pointer; here the initial value is that of a caller's variable.
     let (mut gaussians, mut report, mut error) =
         (garbage::<vg_gaussians>(), garbage::<vg_report>(), garbage::<vg_error>());
     unsafe {

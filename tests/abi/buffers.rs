@@ -1,8 +1,8 @@
-//! What comes out of a fixed scene: the Gaussians and a picture of the bundled sample, through the C functions.
+//! Results of a fixed scene: the Gaussians and a picture of the bundled sample, through the C functions.
 //!
-//! The golden file holds every 499th Gaussian and the whole picture; they are compared within tolerances, so that a
-//! deliberate change of the method shows how large it is. The exact bytes are held by a hash that names the
-//! processor path it was made with.
+//! The golden file holds every 499th Gaussian and the whole picture. They are compared within tolerances, so that the
+//! size of a deliberate change of the method is visible. The exact bytes are compared by a hash, together with the name
+//! of the processor path that made it.
 
 use std::ffi::CString;
 use std::ptr::null_mut;
@@ -81,7 +81,7 @@ unsafe fn made_of_the_sample() -> Buffers {
 
         let pixels = (SIZE[0] * SIZE[1]) as usize;
         let (mut picture, mut depth) = (vec![0.0f32; pixels * 4], vec![0.0f32; pixels]);
-        // The unseen side, from the mirrored place of the first camera.
+        // The unseen side, from the mirrored position of the first camera.
         let mut camera = views[0].camera;
         assert_eq!(
             vg_camera_scale(&raw const camera, SIZE[0], SIZE[1], &raw mut camera, null_mut()),
@@ -152,8 +152,8 @@ fn the_sample_gives_the_golden_buffers() {
     assert_eq!(u64::from_le_bytes(expected[..8].try_into().unwrap()), buffers.count as u64, "Gaussians");
     let (expected, found) = (numbers(&expected[8..]), numbers(&found[8..]));
     assert_eq!(expected.len(), found.len());
-    // Two processors round sums of some hundred terms differently: 1e-4 of metres, colours and alpha is more than
-    // that and less than anything to be seen. A threshold may fall differently in a few pixels.
+    // Two processors round sums of some hundred terms differently: 1e-4 of metres, colours and alpha is more than that
+    // and less than a visible difference. A threshold may fall differently in a few pixels.
     let off: Vec<usize> = (0..found.len())
         .filter(|&i| (expected[i] - found[i]).abs() > 1e-4 * expected[i].abs().max(1.0))
         .collect();

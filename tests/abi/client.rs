@@ -36,7 +36,7 @@ fn clients_of_every_release_still_run() {
     }
 }
 
-/// The machine code that a compiler made of a client in the days of its release: it knows only what it was promised.
+/// Machine code that a compiler made from a client at the time of its release: it contains only what was promised then.
 #[test]
 fn objects_compiled_at_each_release_still_link_and_run() {
     if !cfg!(all(target_arch = "x86_64", target_os = "linux")) || !have(&cc(), "gcc", "old objects") {
@@ -59,13 +59,13 @@ fn objects_compiled_at_each_release_still_link_and_run() {
 }
 
 #[test]
-fn the_header_of_the_latest_release_is_todays_or_todays_has_more() {
+fn todays_header_contains_the_header_of_the_latest_release() {
     let today = crate::symbols::declared();
     for release in releases() {
         let header = std::fs::read_to_string(release.join("vg.h")).unwrap();
         let source = std::fs::read_to_string(release.join("client.c")).unwrap();
         for name in functions(&header) {
-            assert!(today.contains(&name), "{name} of {} is gone", release.display());
+            assert!(today.contains(&name), "{name} of {} is missing", release.display());
             assert!(
                 source.contains(&format!("{name}(")),
                 "{}: the client does not call {name}",
@@ -109,7 +109,7 @@ fn the_client_compiles_clean_as_c_and_as_cxx_and_prints_the_same_with_the_static
     run(command.args(["-lm", "-lpthread", "-ldl"]));
     assert_eq!(as_c, run_client(&static_program, folder.path()));
 
-    // "positions 2416776 df54cfba06529b5e": what Rust has, by the golden hashes.
+    // "positions 2416776 df54cfba06529b5e": the array, and its hash in the golden file.
     let golden = std::fs::read_to_string(vg_testing::tools::golden().join("sedan.hash")).unwrap();
     if golden.lines().next() == Some(&crate::buffers::processor()) {
         for array in golden.lines().skip(1).take(5) {
@@ -138,7 +138,7 @@ fn valgrind_finds_no_error_and_no_leak_in_the_client() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn a_thread_may_end_after_it_unloaded_the_library_which_leaves_no_thread() {
+fn a_thread_that_unloads_the_library_can_end_and_no_thread_remains() {
     if !have(&cc(), "gcc", "unloading the library") {
         return;
     }
@@ -153,7 +153,7 @@ fn a_thread_may_end_after_it_unloaded_the_library_which_leaves_no_thread() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn a_fork_is_told_of_its_parents_contexts_and_works_without_them() {
+fn a_fork_refuses_its_parents_contexts_and_works_without_them() {
     if !have(&cc(), "gcc", "forks") {
         return;
     }

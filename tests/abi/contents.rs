@@ -1,4 +1,4 @@
-//! What a generated header contains, and a program that prints sizes, alignments, offsets and numbers of it.
+//! The contents of a generated header, and a program that prints their sizes, alignments, offsets and numbers.
 #![allow(dead_code, unreachable_pub)] // the library's own tests use a part of it
 
 use std::collections::BTreeSet;
@@ -15,7 +15,7 @@ pub struct Contents {
 }
 
 impl Contents {
-    /// Reads a header that either generator made: one field or enumerator per line, comments on lines of their own.
+    /// Parses a header of either generator: one field or enumerator per line, comments on lines of their own.
     pub fn of(header: &str) -> Self {
         let mut contents = Self::default();
         let mut fields: Option<(String, Vec<String>)> = None;
@@ -30,7 +30,7 @@ impl Contents {
                 in_enum = true;
             } else if line.starts_with('}') {
                 in_enum = false;
-                // safer-ffi wraps arrays into structs without a name.
+                // safer-ffi wraps arrays in structs without a name.
                 contents.structs.extend(fields.take().filter(|(tag, _)| !tag.is_empty()));
             } else if let Some((_, fields)) = &mut fields {
                 fields.push(field_name(line));
@@ -50,7 +50,7 @@ impl Contents {
         self.enumerators.len()
     }
 
-    /// A program that prints all of it.
+    /// Source of a program that prints all of it.
     fn program(&self, include: &str) -> String {
         let mut program = format!(
             "#include <stdio.h>\n#include <stddef.h>\n#include {include:?}\n\
@@ -74,7 +74,7 @@ impl Contents {
         program + "return 0;\n}\n"
     }
 
-    /// What the program prints under a compiler.
+    /// Output of the program under a compiler.
     pub fn printed_by(&self, compiler: &str, standard: &str, include: &Path) -> String {
         let folder = scratch();
         let is_cxx = standard.starts_with("c++");

@@ -1,4 +1,4 @@
-//! Every field of every struct after its `_init` function, as a C program sees it.
+//! Values of every field of every struct after its `_init` function, printed by a C program.
 
 use crate::contents::functions;
 use std::fmt::Write;
@@ -6,13 +6,13 @@ use std::process::Command;
 use vg_testing::root;
 use vg_testing::tools::{STRICT, assert_golden, cc, compile, golden, have, library_folder, run, scratch};
 
-/// A field as the header declares it.
+/// A field from its declaration in the header.
 struct Field {
     name: String,
     kind: Kind,
 }
 
-/// How a field is printed.
+/// The way a field is printed.
 enum Kind {
     Number { conversion: &'static str, cast: &'static str },
     Numbers { conversion: &'static str, cast: &'static str },
@@ -58,18 +58,18 @@ fn field(declaration: &str) -> Field {
         of if of.trim_start_matches("struct ").starts_with("vg_") => {
             Kind::Struct(of.trim_start_matches("struct ").to_owned())
         }
-        other => panic!("{name}: {} does not know how to print {other}", file!()),
+        other => panic!("{name}: {} cannot print {other}", file!()),
     };
     Field { name, kind }
 }
 
-/// Prints a struct that is at `place`, a line for each field, named `name.field`.
+/// Adds code that prints the struct at `place`, one line per field, named `name.field`.
 fn print(program: &mut String, all: &[(String, Vec<Field>)], of: &str, place: &str, name: &str) {
     let fields = &all.iter().find(|(n, _)| n == of).unwrap_or_else(|| panic!("no struct {of}")).1;
     for field in fields {
         let (place, name) = (format!("{place}.{}", field.name), format!("{name}.{}", field.name));
         let _ = match &field.kind {
-            // It grows with the struct, which is what the golden layout is about.
+            // The size grows with the struct; the golden layout tests it.
             _ if field.name == "struct_size" => {
                 writeln!(
                     program,
@@ -108,10 +108,10 @@ fn every_field_has_its_golden_default() {
         .to_owned();
     for (name, fields) in &all {
         let init = format!("{name}_init");
-        // vg_image, which is the same for ever, has none.
+        // vg_image never grows and has no `_init` function.
         assert_eq!(functions.contains(&init), fields[0].name == "struct_size", "{name} and {init}");
         if functions.contains(&init) {
-            // What the function does not set is seen.
+            // Fields that the function does not set print as '?'.
             let _ = writeln!(program, "{{\n{name} s;\nmemset(&s, 0x5A, sizeof s);");
             let _ = writeln!(program, "if ({init}(&s, sizeof s) != VG_STATUS_OK) return 1;");
             print(&mut program, &all, name, "s", name);

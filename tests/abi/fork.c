@@ -1,6 +1,6 @@
 /*
- * What a fork may do with what its parent made, while the parent's other threads work: contexts are an error and are
- * freed without waiting, calls without one give the same picture, and nothing hangs.
+ * Handles of the parent in a forked child, while other threads of the parent work: contexts give an error
+ * and are freed without waiting, calls without a context give the same picture, and nothing hangs.
  *
  *     fork
  */
@@ -41,7 +41,7 @@ static vg_status draw(vg_context *context, unsigned char *picture, vg_error **er
     return vg_render(ball, &camera, &options, &target, error);
 }
 
-/* Holds and gives back whatever locks the library has, all the time. */
+/* Takes and releases all locks of the library, continuously. */
 static void *busy(void *context) {
     unsigned char picture[4 * WIDTH * HEIGHT];
     while (!done) {

@@ -1,4 +1,4 @@
-//! The backward pass through the C functions has the bytes of the Rust library.
+//! The backward pass through the C functions gives the bytes of the Rust library.
 
 use std::ptr::null_mut;
 use vg::gaussians::Gaussians;
@@ -11,7 +11,7 @@ use vg_face::capi::*;
 const SIZE: [u32; 2] = [40, 30];
 const COUNT: usize = 60;
 
-/// Numbers in 0 to 1 that look random.
+/// Pseudo-random numbers from 0 to 1.
 fn numbers(n: usize, seed: usize) -> impl Iterator<Item = f32> {
     (0..n).map(move |i| ((i * 7919 + seed * 104_729) % 10_007) as f32 / 10_007.0)
 }
@@ -24,13 +24,13 @@ fn rows<const N: usize>(seed: usize, of: impl Fn(f32) -> f32) -> Vec<[f32; N]> {
 struct Arrays {
     means: Vec<[f32; 3]>,
     scales: Vec<[f32; 3]>,
-    /// Of any norm.
+    /// Quaternions of any norm.
     rotations: Vec<[f32; 4]>,
     opacities: Vec<f32>,
     sh: Vec<f32>,
 }
 
-/// What C wrote: arrays, then the planes of the picture.
+/// Results from C: arrays, then the planes of the picture.
 struct Found {
     gradients: Gradients,
     view_matrix: [[f64; 4]; 4],
@@ -39,7 +39,7 @@ struct Found {
     depth: Vec<f32>,
 }
 
-/// Where the Gaussians are seen from: 3 metres behind them.
+/// A camera 3 metres behind the Gaussians.
 fn camera(model: CameraModel) -> vg::Camera {
     let mut params = vec![40.0, 41.0, 19.0, 16.0];
     if model == CameraModel::OpenCv {
@@ -130,7 +130,7 @@ unsafe fn through_c(
 }
 
 #[test]
-fn gradients_through_c_have_the_bytes_of_rust() {
+fn gradients_through_c_equal_those_of_rust_byte_for_byte() {
     let arrays = Arrays {
         means: rows(1, |v| 2.0 * v - 1.0),
         scales: rows(2, |v| 0.02 + 0.3 * v),
@@ -184,7 +184,7 @@ fn gradients_through_c_have_the_bytes_of_rust() {
             let pose = [expected.pose.rotation, expected.pose.translation].map(|v| v.to_array());
             assert!(
                 expected.means.iter().flatten().filter(|v| **v != 0.0).count() > COUNT,
-                "something to see"
+                "the picture is not empty"
             );
             let posed = c_camera(&camera, model);
             for has_picture in [false, true] {

@@ -1,4 +1,4 @@
-//! `include/vg.h` is what cbindgen makes of `src/capi`, and every compiler takes it.
+//! `include/vg.h` equals what cbindgen generates from `src/capi`, and compiles everywhere.
 
 use std::process::Command;
 use vg_testing::root;
@@ -30,7 +30,7 @@ const CHAPTERS: [&str; 21] = [
 ];
 
 #[test]
-fn the_header_is_what_the_source_says() {
+fn the_header_equals_the_one_generated_from_the_source() {
     let config = cbindgen::Config::from_file(root().join("cbindgen.toml")).expect("cbindgen.toml");
     let builder = CHAPTERS.iter().fold(cbindgen::Builder::new().with_config(config), |builder, chapter| {
         builder.with_src(root().join(format!("src/capi/{chapter}.rs")))

@@ -1,4 +1,4 @@
-//! Size, alignment and offset of everything in the header, and every number, as C and C++ compilers see them.
+//! Size, alignment and offset of everything in the header, and every number, as compiled by C and C++ compilers.
 
 use crate::contents::Contents;
 use vg_testing::root;
@@ -12,7 +12,10 @@ fn c_and_cxx_see_the_golden_layout() {
     }
     let header = root().join("include/vg.h");
     let contents = Contents::of(&std::fs::read_to_string(&header).unwrap());
-    assert!(contents.structs() >= 10 && contents.enumerators() >= 30, "the header was not understood");
+    assert!(
+        contents.structs() >= 10 && contents.enumerators() >= 30,
+        "too few structs or enumerators were parsed from the header"
+    );
     let mut seen = Vec::new();
     for (compiler, standards) in
         [(vg_testing::tools::cc(), ["c11", "c2x"]), (vg_testing::tools::cxx(), ["c++17", "c++20"])]

@@ -1,5 +1,5 @@
-//! What numbers that come out of the C functions mean: pixels in every format, the measures, what the log says; each
-//! against Rust's own, or what other programs found. What goes in is in `src/capi/tests/meaning.rs`.
+//! The meaning of numbers that the C functions return: pixels in every format, the measures, the lines of the log. Each
+//! is compared with Rust, or with the results of other programs. `src/capi/tests/meaning.rs` tests the arguments.
 
 use std::collections::BTreeMap;
 use std::ffi::{CStr, CString, c_char, c_void};
@@ -22,7 +22,7 @@ macro_rules! initial {
     }};
 }
 
-/// Enumerators whose effect is seen here, which `src/capi/tests/meaning.rs` leaves to this file.
+/// Enumerators whose effect is tested here and not in `src/capi/tests/meaning.rs`.
 const SEEN_HERE: [(&str, usize); 2] = [("VG_FORMAT_", 7), ("VG_LOG_LEVEL_", 3)];
 
 #[test]
@@ -30,13 +30,13 @@ fn no_format_and_no_log_level_is_left_out() {
     let layout = std::fs::read_to_string(golden().join("layout_x86_64.txt")).unwrap();
     for (prefix, seen) in SEEN_HERE {
         let there = layout.lines().filter(|line| line.starts_with(prefix)).count();
-        assert_eq!(there, seen, "{prefix}*: check what the new one does in {}, then count it", file!());
+        assert_eq!(there, seen, "{prefix}*: add a test of the new enumerator in {}, then count it", file!());
     }
 }
 
 // ---- Pictures
 
-/// The model, and the same of C.
+/// The model, in Rust and in C.
 struct Car {
     rust: Gaussians,
     c: *mut vg_gaussians,
@@ -74,7 +74,7 @@ fn camera_in_c(camera: &Camera) -> vg_camera {
     out
 }
 
-/// The bytes of a picture in a format; depth and alpha too where they are wanted.
+/// The bytes of a picture in a format, and depth and alpha if requested.
 fn drawn(
     car: &Car,
     camera: &Camera,
@@ -110,15 +110,15 @@ fn byte(value: f32) -> u8 {
 }
 
 #[test]
-fn a_pixel_has_its_colours_where_its_format_says_over_the_colour_that_was_asked_for() {
+fn a_pixel_has_the_channel_order_of_its_format_and_the_requested_background() {
     let (car, camera) = (Car::new(), camera(-60.0, 6.5, 48, 36));
     let background = [0.2, 0.4, 0.8];
     let mut options = initial!(vg_render_options, vg_render_options_init);
     options.background_color = background;
     let in_rust = RenderOptions { background: Background::Color(background), ..RenderOptions::default() };
     let expected = CpuRenderer::new().render(&car.rust, &camera, &in_rust).unwrap();
-    assert_eq!(expected.color[0], background, "nothing is in the corner");
-    assert!(expected.alpha.iter().any(|a| *a > 0.9), "the vehicle is there");
+    assert_eq!(expected.color[0], background, "the corner is empty");
+    assert!(expected.alpha.iter().any(|a| *a > 0.9), "the vehicle is drawn");
 
     let rgb: Vec<[u8; 3]> = expected.color.iter().map(|c| c.map(byte)).collect();
     let of = |format| drawn(&car, &camera, &options, format, None);
@@ -131,7 +131,7 @@ fn a_pixel_has_its_colours_where_its_format_says_over_the_colour_that_was_asked_
 }
 
 #[test]
-fn transparent_pictures_have_the_alpha_and_the_depth_that_was_asked_for() {
+fn transparent_pictures_have_the_requested_alpha_and_depth() {
     let (car, camera) = (Car::new(), camera(-60.0, 6.5, 48, 36));
     let pixels = (camera.width * camera.height) as usize;
     let mut options = initial!(vg_render_options, vg_render_options_init);
@@ -166,9 +166,9 @@ fn transparent_pictures_have_the_alpha_and_the_depth_that_was_asked_for() {
     }
 }
 
-/// The same grey ramp in every format in which a picture may come.
+/// One grey ramp in every input format.
 #[test]
-fn a_picture_that_comes_in_any_format_is_the_same_picture() {
+fn input_pictures_of_every_format_are_read_as_the_same_picture() {
     const SIDE: u32 = 16;
     let pixels: Vec<[u8; 3]> = (0..SIDE * SIDE).map(|i| [i as u8, (i / 2) as u8, 200]).collect();
     let grey: Vec<u8> = (0..SIDE * SIDE).map(|i| i as u8).collect();
@@ -205,7 +205,7 @@ fn a_picture_that_comes_in_any_format_is_the_same_picture() {
     ] {
         assert_eq!(difference(rgb, (bytes, format)), f64::INFINITY, "{format:?}");
     }
-    assert!(difference(rgb, (&bgr, vg_format::Rgb8)) < 20.0, "exchanged channels are another picture");
+    assert!(difference(rgb, (&bgr, vg_format::Rgb8)) < 20.0, "the test notices exchanged channels");
     let grey_as_rgb: Vec<u8> = grey.iter().flat_map(|&v| [v; 3]).collect();
     assert_eq!(difference((&grey, vg_format::Gray8), (&grey_as_rgb, vg_format::Rgb8)), f64::INFINITY);
 }
@@ -213,7 +213,7 @@ fn a_picture_that_comes_in_any_format_is_the_same_picture() {
 // ---- Cameras
 
 #[test]
-fn each_camera_model_projects_where_colmap_does() {
+fn each_camera_model_projects_as_colmap_does() {
     let path = root().join("tests/golden/cameras_pycolmap.json");
     let cases: serde_json::Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
     let numbers = |value: &serde_json::Value| -> Vec<f64> {
@@ -246,7 +246,7 @@ fn each_camera_model_projects_where_colmap_does() {
             let status = unsafe {
                 vg_camera_project(&raw const camera, point.as_ptr(), found.as_mut_ptr(), null_mut())
             };
-            // COLMAP projects points beyond the fold of a lens too, to where others are seen.
+            // Beyond the fold of a lens, COLMAP projects points to pixels of other points.
             if status == vg_status::Argument {
                 let mut seen = [f64::NAN; 3];
                 let status = unsafe {
@@ -272,7 +272,7 @@ fn each_camera_model_projects_where_colmap_does() {
 
 // ---- Measures
 
-/// Fields of a struct of doubles by name, as the golden layout has them.
+/// Fields of a struct of doubles by name, from the golden layout.
 fn doubles<T>(of: &str, value: &T) -> BTreeMap<String, f64> {
     let layout = std::fs::read_to_string(golden().join("layout_x86_64.txt")).unwrap();
     let prefix = format!("{of}.");
@@ -291,14 +291,14 @@ fn doubles<T>(of: &str, value: &T) -> BTreeMap<String, f64> {
     fields
 }
 
-/// Each field has the number of its namesake, NAN where there is none; a field without an entry fails by name.
+/// Asserts that each field has the value of its namesake in Rust, NAN for none; a field without an entry fails by name.
 #[track_caller]
 fn assert_measures<T>(of: &str, value: &T, expected: &[(&str, Option<f64>)]) {
     let mut found = doubles(of, value);
     for (name, expected) in expected {
         let found = found.remove(*name).unwrap_or_else(|| panic!("{of} has no field {name}"));
         let expected = expected.unwrap_or(f64::NAN);
-        // A quaternion that is normalised once more on its way into C changes the last bits.
+        // Normalising a quaternion once more in C changes the last bits.
         let same = found == expected || (found - expected).abs() <= 1e-5 * expected.abs();
         assert!(same || found.is_nan() && expected.is_nan(), "{of}.{name}: {found}, {expected} in Rust");
     }
@@ -306,9 +306,9 @@ fn assert_measures<T>(of: &str, value: &T, expected: &[(&str, Option<f64>)]) {
 }
 
 #[test]
-fn each_measure_of_a_surface_is_its_namesake_in_rust() {
+fn each_measure_of_a_surface_equals_its_namesake_in_rust() {
     let car = Car::new();
-    // The model without its front end, and higher: no two measures are alike.
+    // The model without its front end, and higher, so that no two measures are equal.
     let scan: Vec<[f32; 3]> =
         car.rust.means().iter().filter(|p| p[0] < 1.0).map(|p| [p[0], p[1], 1.1 * p[2]]).collect();
     for f_score_m in [0.05, 0.1] {
@@ -342,7 +342,7 @@ fn each_measure_of_a_surface_is_its_namesake_in_rust() {
     }
 }
 
-/// Measures that were exchanged would be seen.
+/// Asserts that all measures differ, so that exchanged ones would be noticed.
 #[track_caller]
 fn assert_all_different(measures: &BTreeMap<String, f64>) {
     let mut values: Vec<f64> = measures.values().copied().filter(|v| !v.is_nan()).collect();
@@ -350,7 +350,7 @@ fn assert_all_different(measures: &BTreeMap<String, f64>) {
     assert!(values.windows(2).all(|pair| pair[1] - pair[0] > 1e-4), "{measures:?}");
 }
 
-/// A view in C, pointing into one of Rust.
+/// A view in C that points into one of Rust.
 fn view_in_c(view: &View, name: &CStr) -> vg_view {
     let mut out = initial!(vg_view, vg_view_init);
     let (width, height) = (view.camera.width, view.camera.height);
@@ -364,14 +364,14 @@ fn view_in_c(view: &View, name: &CStr) -> vg_view {
     };
     (out.name, out.camera) = (name.as_ptr(), camera_in_c(&view.camera));
     out.image = image(view.image.pixels().as_ptr().cast(), vg_format::Rgb8);
-    // A label is one byte: 255 is vehicle, the others lie below 128.
+    // A label is one byte: 255 is vehicle, all others are below 128.
     out.mask = image(view.mask.as_ref().unwrap().labels().as_ptr().cast(), vg_format::Gray8);
     out.depth = image(view.depth.as_ref().unwrap().depth().as_ptr().cast(), vg_format::Depth32f);
     out
 }
 
 #[test]
-fn each_measure_of_a_view_and_of_two_pictures_is_its_namesake_in_rust() {
+fn each_measure_of_a_view_and_of_two_pictures_equals_its_namesake_in_rust() {
     let car = Car::new();
     let view = view("a", camera(-60.0, 6.5, 48, 36));
     let in_c = view_in_c(&view, c"a");
@@ -430,9 +430,9 @@ unsafe extern "C" fn keep(level: i32, message: *const c_char, lines: *mut c_void
 }
 
 #[test]
-fn each_line_of_the_log_has_the_level_of_what_it_says() {
+fn each_line_of_the_log_has_the_level_of_its_content() {
     let scene = right_side(48, 36);
-    // The same camera again is left out.
+    // A view with the same camera is left out.
     let views: Vec<&View> = scene.views.iter().chain([&scene.views[0]]).collect();
     let names: Vec<CString> = (0..views.len()).map(|i| CString::new(format!("{i}")).unwrap()).collect();
     let views: Vec<vg_view> = views.iter().zip(&names).map(|(view, name)| view_in_c(view, name)).collect();
@@ -458,7 +458,7 @@ fn each_line_of_the_log_has_the_level_of_what_it_says() {
         assert_eq!(level_of(stage), [debug], "{stage}{lines:?}");
     }
 
-    // A unit that makes a toy of the vehicle is legal, and looks like a mistake.
+    // A unit that gives a vehicle of toy size is legal, but probably a mistake.
     let mut lines = Lines::new();
     let mut options = initial!(vg_scene_options, vg_scene_options_init);
     let wanted = [c"000".as_ptr()];

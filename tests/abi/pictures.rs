@@ -1,4 +1,4 @@
-//! The same photographs in every layout that C hands them over in.
+//! Photographs in every memory layout that C accepts give the same bytes.
 
 use std::ptr::null_mut;
 use vg::scene::{Scene, View};
@@ -6,13 +6,13 @@ use vg_face::capi::*;
 
 use vg_testing::vehicle::{right_side, without_depth};
 
-/// How a photograph lies in the caller's memory.
+/// The layout of a photograph in the caller's memory.
 #[derive(Clone, Copy, Debug)]
 struct Layout {
     format: vg_format,
     /// Bytes between rows.
     gap: usize,
-    /// What alpha says, where the format has it.
+    /// The content of alpha, if the format has it.
     alpha: Alpha,
     has_mask: bool,
 }
@@ -45,7 +45,7 @@ fn pixels(view: &View, layout: Layout) -> Vec<u8> {
     bytes
 }
 
-/// The status, and the Gaussians' arrays one after the other.
+/// The status, and the Gaussians' arrays concatenated.
 fn made_of(scene: &Scene, layout: Layout) -> (vg_status, Vec<f32>) {
     let pixels: Vec<Vec<u8>> = scene.views.iter().map(|view| pixels(view, layout)).collect();
     let views: Vec<vg_view> =
@@ -93,7 +93,7 @@ fn lent(view: &View, pixels: &[u8], layout: Layout) -> vg_view {
     };
     out.image = image(pixels.as_ptr(), pixels.len() / camera.height as usize, layout.format);
     if layout.has_mask {
-        // A label is one byte: 255 is vehicle, the others lie below 128.
+        // A label is one byte: 255 is vehicle, all others are below 128.
         out.mask = image(view.mask.as_ref().unwrap().labels().as_ptr().cast(), 0, vg_format::Gray8);
     }
     out
@@ -118,7 +118,7 @@ fn every_layout_of_the_same_photographs_makes_the_same_bytes() {
 }
 
 #[test]
-fn alpha_that_hides_nothing_is_no_mask() {
+fn opaque_alpha_is_not_a_mask() {
     let scene = without_depth(right_side(48, 36));
     for (format, alpha) in [(vg_format::Rgb8, Alpha::Mask), (vg_format::Rgba8, Alpha::Opaque)] {
         let layout = Layout { format, gap: 0, alpha, has_mask: false };

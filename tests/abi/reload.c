@@ -1,7 +1,7 @@
 /*
- * A thread that loads the library, reads, writes, reconstructs and draws with it, unloads it, and ends after that:
- * with the process's own context, with one that works on this thread, and with one that has threads. Nothing of the
- * library may be left running, and what a thread runs when it ends must still be there.
+ * A thread that loads the library, reads, writes, reconstructs and draws with it, unloads it, and then ends: with the
+ * context of the process, with one that works on this thread, and with one that has threads. No code of the library may
+ * keep running, and code that runs at the end of the thread must still be in memory.
  *
  *     reload LIBRARY SCENE_FOLDER SCRATCH_FOLDER
  */
@@ -15,10 +15,10 @@
 
 #include "vg.h"
 
-/* What vg.h says that a calling thread needs. */
+/* The stack size that vg.h requires of a calling thread. */
 enum { STACK_BYTES = 1 << 20 };
 
-/* Names of views: four of them are enough. */
+/* Names of views; four are enough. */
 static const char *const names[4] = {"000", "001", "002", "003"};
 
 static const char *library_path, *scene_path;
@@ -38,7 +38,7 @@ static int threads(void) {
     return count;
 }
 
-/* A thread that was joined runs nothing any more, but is listed until the kernel has buried it. */
+/* A joined thread no longer runs, but is listed until the kernel has removed it. */
 static int threads_left(int expected) {
     const struct timespec millisecond = {0, 1000000};
     int wait;
@@ -57,7 +57,7 @@ static void check(int holds, const char *what) {
 
 #define CHECK(condition) check((condition), #condition)
 
-/* A function of the library; ISO C knows no conversion from an object's address to a function's. */
+/* Looks up a function of the library; ISO C has no conversion from an object pointer to a function pointer. */
 static void load(void *library, const char *name, void *function) {
     void *address = dlsym(library, name);
     CHECK(address != NULL);
@@ -68,7 +68,7 @@ static void load(void *library, const char *name, void *function) {
     result(*name) parameters;          \
     load(library, #name, &name)
 
-/* `asked`: threads of the context; -1: none is named. */
+/* `asked`: threads of the context; -1: no context. */
 static void *use(void *asked) {
     int count = *(int *)asked, before = threads();
     vg_context_options settings;

@@ -1,4 +1,4 @@
-//! What the shared library exports, and the name under which the loader looks for it.
+//! The exported symbols of the shared library, and its soname.
 
 use crate::contents::functions;
 use std::collections::BTreeSet;
@@ -32,11 +32,11 @@ fn exactly_the_functions_of_the_golden_list_are_exported() {
 
     let exported: BTreeSet<String> =
         exported.iter().map(|l| l.split(' ').next().unwrap().to_owned()).collect();
-    assert_eq!(exported, declared(), "the library exports what the header declares");
+    assert_eq!(exported, declared(), "the library exports the functions of the header");
 }
 
 #[test]
-fn the_library_answers_to_its_soname() {
+fn the_library_has_its_soname() {
     if !have("readelf", "binutils", "soname") {
         return;
     }
@@ -44,7 +44,7 @@ fn the_library_answers_to_its_soname() {
     assert!(dynamic.contains("Library soname: [libvg.so.0]"), "{dynamic}");
 }
 
-/// What runs when a thread ends, after the host may have unloaded the library, is still there.
+/// Code that runs at the end of a thread stays in memory even if the host has unloaded the library.
 #[test]
 fn the_library_stays_in_memory_when_it_is_unloaded() {
     if !have("readelf", "binutils", "the flags of the library") {

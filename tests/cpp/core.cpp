@@ -1,4 +1,4 @@
-// vg.hpp without other libraries: results, ownership, callbacks, errors. Prints nothing where all is well.
+// vg.hpp without other libraries: results, ownership, callbacks, errors. Prints nothing on success.
 //
 //     core SCRATCH_FOLDER
 #include <array>
@@ -31,15 +31,15 @@ constexpr bool only_moves =
     !std::is_copy_assignable_v<T>;
 static_assert(only_moves<vg::Context> && only_moves<vg::Model> && only_moves<vg::Scene> &&
               only_moves<vg::Gaussians> && only_moves<vg::Report>);
-static_assert(!std::is_convertible_v<vg::Result<int>, bool>, "a Result is a condition, not a number");
-static_assert(!std::is_convertible_v<vg_gaussians *, vg::Gaussians>, "taking a handle over is written down");
+static_assert(!std::is_convertible_v<vg::Result<int>, bool>, "a Result converts to a condition, not to a number");
+static_assert(!std::is_convertible_v<vg_gaussians *, vg::Gaussians>, "taking ownership of a handle is explicit");
 
 /// Whether `place = value` compiles.
 template <class Place, class Value> constexpr bool takes = std::is_assignable_v<Place &, Value>;
 using Prior = decltype(vg::Options::prior);
 static_assert(takes<Prior, vg::Prior> && takes<Prior, vg_prior>);
 static_assert(!takes<Prior, vg_symmetry> && !takes<Prior, vg::Symmetry> && !takes<Prior, int>,
-              "the name of another choice is no prior");
+              "the name of another enumeration is not a prior");
 static_assert(!takes<decltype(vg::Options::symmetry), vg_prior> && !takes<decltype(vg::Options::keep), vg_prior> &&
               !takes<decltype(vg::Options::calibrate), vg_relight> && !takes<decltype(vg::Options::relight), int> &&
               !takes<decltype(vg::Options::refine_backend), vg_alpha> &&
@@ -102,7 +102,7 @@ void choices_are_the_numbers_of_the_c_structs() {
     CHECK(in_c.prior == VG_PRIOR_HULL && in_c.symmetry == VG_SYMMETRY_NEVER);
     CHECK(in_c.keep == (VG_KEEP_OVERLAP | VG_KEEP_SH_BANDS));
 
-    // A copy has fields of its own.
+    // A copy has its own fields.
     options.on_log = [](vg_log_level, const char *) {};
     vg::Options copy = options;
     CHECK(copy.prior == vg::Prior::Hull && copy.prior != VG_PRIOR_AUTO && copy.on_log);
@@ -121,7 +121,7 @@ void choices_are_the_numbers_of_the_c_structs() {
     CHECK(static_cast<const vg_render_options &>(same_picture).depth_mode == VG_DEPTH_MODE_ACCUMULATED);
 }
 
-/// How a program ends that takes a value which is not there.
+/// Checks how a program ends that takes a missing value.
 void taking_what_is_not_there_ends_the_program() {
     const pid_t child = fork();
     if (child == 0) {
@@ -248,7 +248,7 @@ void a_cloud_is_lent() {
     CHECK(options.resolution == 1 && options.max_views == 0 && options.max_gaussians == 12000000);
     options.lend_cloud(cloud);
     CHECK(options.cloud == cloud[0].data() && options.cloud_count == 5);
-    // Depth says all: the report tells how many points were not needed.
+    // Given depth is complete: the report counts the unused points.
     const vg::Reconstruction made = vg::reconstruct({photographs.view()}, options).take();
     CHECK(std::strstr(made.report.json(), "\"count\": 5") != nullptr);
     CHECK(made.report.figures().cloud_used == 0);
@@ -259,7 +259,7 @@ void a_cloud_is_lent() {
     CHECK(options.cloud == nullptr && options.cloud_count == 0);
 }
 
-/// A program that finds out whether its library has networks.
+/// Determines whether the library has networks.
 void models_are_opened_and_lent() {
     vg::ModelOptions settings;
     CHECK(settings.runtime == nullptr && settings.provider == VG_PROVIDER_CPU && settings.threads == 0);
@@ -432,7 +432,7 @@ void pictures_own_their_pixels(const vg::Gaussians &car) {
     on_cpu.backend = VG_BACKEND_CPU;
     const vg::Renderer ready = vg::Renderer::make(car, on_cpu).take();
     CHECK(ready.backend() == VG_BACKEND_CPU && std::string(ready.choice()).find("asked for") != std::string::npos);
-    // What one call writes may not overlap.
+    // Outputs of one call must not overlap.
     std::vector<float> others(metres.size());
     vg::ImageTarget other = target;
     other.depth = others.data();
@@ -460,7 +460,7 @@ void gradients_own_their_numbers_and_a_loss_sees_the_picture(const vg::Gaussians
     const vg::Gradients whole = vg::render_backward(car, camera, gradient).take();
     CHECK(whole.positions.size() == car.positions().size() && whole.sh.size() == car.sh().size());
     CHECK(whole.rotations.size() == 4 * car.size() && whole.opacities.size() == car.size());
-    // Where the car does not cover it, a brighter background is as much brighter a picture.
+    // Outside the car, a brighter background gives an equally brighter picture.
     CHECK(whole.background[0] > 1 && whole.background[0] < pixels && whole.view_matrix[12] == 0);
 
     int calls = 0;

@@ -9,7 +9,7 @@
 
 namespace {
 
-// No two numbers alike, so that a transposed one is seen.
+// No two numbers are equal, so that a transposition is noticed.
 const Eigen::Quaterniond rotation = Eigen::Quaterniond(1, 2, 3, 4).normalized();
 const Eigen::Vector3d position(5, 6, 7);
 
@@ -39,7 +39,7 @@ void poses_arrive_row_major() {
 
     const vg_camera camera = vg::pinhole(100, 100, 32, 32, 64, 64, vg::pose(isometry)).take();
     CHECK(vg::isometry(camera).isApprox(isometry, 1e-15));
-    // What the camera sees at (0, 0, 2) of its own frame lies there in the vehicle's.
+    // The point (0, 0, 2) of the camera's frame, in the vehicle's frame.
     const Eigen::Vector3d point = isometry * Eigen::Vector3d(0, 0, 2);
     const auto pixel = vg::project(camera, {point.x(), point.y(), point.z()}).take();
     CHECK(pixel[0] > 32 - 1e-9 && pixel[0] < 32 + 1e-9 && pixel[1] > 32 - 1e-9 && pixel[1] < 32 + 1e-9);

@@ -1,4 +1,4 @@
-// vg.hpp with OpenCV: what a cv::Mat may be, that it is not copied, that its channels arrive in their order.
+// vg.hpp with OpenCV: the accepted kinds of cv::Mat, that it is not copied, and the order of channels.
 #include <opencv2/core.hpp>
 
 #include <limits>
@@ -28,14 +28,14 @@ cv::Mat as_mat(const std::vector<float> &metres) {
     return cv::Mat(columns, columns, CV_32FC1, const_cast<float *>(metres.data())).clone();
 }
 
-/// Channels in another order, without cvtColor, which is in another library.
+/// Exchanges channels without cvtColor, which is in another library.
 cv::Mat reordered(const cv::Mat &from, int type, const std::vector<int> &pairs) {
     cv::Mat to(from.rows, from.cols, type, cv::Scalar::all(255));
     cv::mixChannels(&from, 1, &to, 1, pairs.data(), pairs.size() / 2);
     return to;
 }
 
-/// The same pixels in the middle of a larger picture of other pixels.
+/// Places the pixels inside a larger picture of other pixels.
 cv::Mat in_larger(const cv::Mat &mat) {
     cv::Mat larger(mat.rows + 7, mat.cols + 9, mat.type(), cv::Scalar::all(77));
     cv::Mat region = larger(cv::Rect(5, 3, mat.cols, mat.rows));
@@ -104,7 +104,7 @@ void other_types_are_errors_that_name_them(const Mats &mats) {
 }
 
 void depth_in_millimetres_is_the_same_in_metres(const Mats &mats, const vg::Gaussians &car) {
-    // Whole millimetres, so that nothing is rounded away.
+    // Whole millimetres, so that nothing is rounded.
     cv::Mat millimetres, whole;
     mats.metres.convertTo(millimetres, CV_16U, 1000);
     millimetres.convertTo(whole, CV_32F, 0.001);
@@ -114,7 +114,7 @@ void depth_in_millimetres_is_the_same_in_metres(const Mats &mats, const vg::Gaus
     const vg_view view = vg::view(mats.bgr, mats.mask, measured, camera_at_right()).take();
     CHECK(model(view).size() == car.size());
 
-    // Another sensor's unit, and floats.
+    // The unit of another sensor, and floats.
     const cv::Mat tenths = vg::metres(millimetres, 0.0001).take();
     CHECK(!(cv::norm(10 * tenths, measured, cv::NORM_INF) > 1e-5));
     CHECK(vg::metres(1000 * mats.metres)->type() == CV_32FC1);
@@ -128,7 +128,7 @@ void depth_in_millimetres_is_the_same_in_metres(const Mats &mats, const vg::Gaus
 void photographs_without_masks_are_lent(const Mats &mats) {
     const vg::Model none;
     const vg_camera camera = camera_at_right();
-    // The library's words: the picture was taken, the network is what is missing.
+    // The library's message: the picture is valid, the network is missing.
     CHECK(vg::segment(none, mats.bgr, camera).error().message.find("model: ") == 0);
     CHECK(failed(vg::segment(none, mats.metres, camera), VG_STATUS_ARGUMENT, "CV_32FC1"));
 }
@@ -169,7 +169,7 @@ void pictures_go_into_matrices(const vg::Gaussians &car) {
     CHECK(untouched.empty());
 }
 
-/// Floats, alpha, and a renderer that draws many.
+/// Floats, alpha, and a renderer for many pictures.
 void pictures_of_floats_and_of_renderers_go_into_matrices(const vg::Gaussians &car) {
     const vg_camera camera = camera_at_right();
     vg::RenderOptions transparent;

@@ -1,4 +1,4 @@
-// A second file of the same program with everything that vg.hpp has.
+// A second file of the same program that uses everything in vg.hpp.
 #include "vg.hpp"
 
 #include "vg.hpp"

@@ -1,4 +1,4 @@
-// vg.hpp with VG_HPP_EXCEPTIONS, beside a file of the same program without. Prints nothing where all is well.
+// vg.hpp with VG_HPP_EXCEPTIONS, together with a file of the same program without. Prints nothing on success.
 #define VG_HPP_EXCEPTIONS
 #include "vg.hpp"
 
@@ -15,14 +15,14 @@
         }                                                                                                    \
     } while (0)
 
-// In the file that knows of no exceptions.
+// In the file without exceptions.
 bool fails_quietly_in_the_other_file(const std::string &path);
 
 namespace {
 
 static_assert(std::is_base_of_v<std::runtime_error, vg::Exception>);
 
-/// Whether this throws what the library said.
+/// Whether this throws the error of the library.
 template <class Call> bool throws(vg_status status, const char *words, const Call &call) {
     try {
         call();

@@ -1,4 +1,4 @@
-// What the tests of vg.hpp share.
+// Code shared by the tests of vg.hpp.
 #ifndef VG_TEST_HPP
 #define VG_TEST_HPP
 
@@ -17,7 +17,7 @@
         }                                                                                                    \
     } while (0)
 
-/// Whether a call failed with this status and these words.
+/// Whether a call failed with this status and message.
 template <class T> bool failed(const vg::Result<T> &result, vg_status status, const char *words) {
     if (result || result.error().status != status ||
         result.error().message.find(words) == std::string::npos) {
@@ -39,7 +39,7 @@ inline vg_camera camera_at_right() {
     return vg::pinhole(60, 60, side / 2.0, side / 2.0, side, side, pose_at_right()).take();
 }
 
-/// A picture of a ball, R G B: reddish, and no two channels or rows alike.
+/// A picture of a ball, R G B: reddish, with no two channels or rows equal.
 inline std::vector<std::uint8_t> ball_rgb() {
     std::vector<std::uint8_t> pixels;
     for (std::uint32_t v = 0; v < side; v++) {
@@ -67,7 +67,7 @@ inline std::vector<std::uint8_t> ball_mask() {
     return pixels;
 }
 
-/// The near side of the ball, metres.
+/// Depth of the near side of the ball, metres.
 inline std::vector<float> ball_depth() {
     std::vector<float> metres;
     for (std::uint32_t v = 0; v < side; v++) {

@@ -1,6 +1,6 @@
 """The paper's activations: 38 raw channels per pixel to Gaussians (method section 3), differentiable.
 
-The library's src/head/attributes.rs computes the same; the tests hold both to the same numbers.
+crates/vehicle-gaussians/src/head/attributes.rs of the library computes the same; the tests compare both with the same numbers.
 """
 
 import torch
@@ -33,7 +33,7 @@ def scale(raw, activation):
 
 def rotation(raw):
     """q / |q|; a zero quaternion means no rotation. [n][4]"""
-    # The largest component first: squares of 1e-30 vanish and those of 1e30 overflow. The quotient does not
+    # Divided by the largest component first: squares of 1e-30 vanish and those of 1e30 overflow. The quotient does not
     # depend on it, so no gradient passes.
     largest = raw.detach().abs().amax(-1, keepdim=True)
     zero = largest == 0

@@ -1,4 +1,4 @@
-"""Writes a head as ONNX, contract "gaussian head" version 1, and holds ONNX Runtime's answers to PyTorch's.
+"""Writes a head as ONNX, contract "gaussian head" version 1, and compares ONNX Runtime's outputs with PyTorch's.
 
     python training/head/export.py --checkpoint head.pt --license "CC-BY-4.0" -o head.onnx
     python training/head/export.py --encoder resnet50 --random --seed 1 -o head.onnx
@@ -6,7 +6,7 @@
 Inputs, all float32: images [N][3][H][W] RGB in [0, 1]; depth [N][H][W] planar z in metres, 0 = none; intrinsics
 [N][3][3] in pixels, the centre of the top-left pixel at (0.5, 0.5). Output: attributes [N][38][H][W], raw. N, H and W
 are free; H and W are multiples of `vg.size_multiple`: the host pads right and bottom with zeros and crops the
-answer. Every view is answered by itself.
+output. Every view is processed independently.
 """
 
 import argparse
@@ -31,20 +31,20 @@ CHECK_SIZES = ((2, 96, 128), (1, 64, 160))  # N, H, W
 def main():
     parser = argparse.ArgumentParser()
     source = parser.add_mutually_exclusive_group(required=True)
-    source.add_argument("--checkpoint", help="what train.py wrote")
+    source.add_argument("--checkpoint", help="a checkpoint of train.py")
     source.add_argument("--random", action="store_true", help="an untrained head: the surfel solution")
     parser.add_argument("--encoder", default="resnet50", help="with --random")
     parser.add_argument("--scale-activation", choices=SCALE_ACTIVATIONS, default="softplus", help="with --random")
-    parser.add_argument("--no-offset", action="store_true", help="with --random: the head moves no centres")
+    parser.add_argument("--no-offset", action="store_true", help="with --random: the head does not move centres")
     parser.add_argument("--seed", type=int, default=1, help="with --random")
-    parser.add_argument("--spread", type=float, default=0.0, help="with --random: of the last layer, so that all show")
-    parser.add_argument("--license", help="of the weights; needed with --checkpoint")
+    parser.add_argument("--spread", type=float, default=0.0, help="with --random: spread of the last layer")
+    parser.add_argument("--license", help="licence of the weights; required with --checkpoint")
     parser.add_argument("-o", "--output", required=True)
     args = parser.parse_args()
 
     if args.checkpoint:
         if not args.license:
-            parser.error("--checkpoint needs --license: whoever gets the file must know")
+            parser.error("--license: missing; required with --checkpoint, because it is stored in the file")
         head, license = load(args.checkpoint), args.license
         digest = hashlib.sha256(Path(args.checkpoint).read_bytes()).hexdigest()
         weights = f"{Path(args.checkpoint).name} sha256:{digest}"
@@ -65,8 +65,8 @@ def main():
 
 @torch.no_grad()
 def randomize(head, spread):
-    """An untrained head whose layers all show in its answer, with the statistics that training would leave: without
-    them a deep residual network's answers are thousands, and say nothing about precision."""
+    """An untrained head in which all layers affect the output, with statistics as after training: without
+    them the outputs of a deep residual network are thousands, which makes precision meaningless."""
     norms = [module for module in head.modules() if isinstance(module, torch.nn.BatchNorm2d)]
     for norm in norms:
         norm.momentum = 1.0
@@ -93,7 +93,7 @@ def write(head, path, weights, license):
     views, rows, columns = (torch.export.Dim(name, min=1) for name in ("views", "rows", "columns"))
     height, width = SIZE_MULTIPLE * rows, SIZE_MULTIPLE * columns
     with warnings.catch_warnings():
-        # The exporter says that inputs share sizes, which is what is meant.
+        # The exporter warns that inputs share sizes, which is intended.
         warnings.filterwarnings("ignore", message=".*axis name.*")
         program = torch.onnx.export(
             head,
@@ -106,7 +106,7 @@ def write(head, path, weights, license):
         )
     model = program.model_proto
     strip(model.graph)
-    # Plain names of the sizes, for whoever looks at the file.
+    # Plain names of the sizes, for readers of the file.
     sizes = {
         "images": ("N", 3, "H", "W"),
         "depth": ("N", "H", "W"),
@@ -121,7 +121,7 @@ def write(head, path, weights, license):
 
 
 def strip(graph):
-    """Takes out what the exporter notes about its source: nobody reads it and a small model is half of it."""
+    """Removes the exporter's notes about its source, which are not needed and are half of a small model."""
     del graph.value_info[:], graph.metadata_props[:]
     for entry in (*graph.node, *graph.initializer, *graph.input, *graph.output):
         del entry.metadata_props[:]

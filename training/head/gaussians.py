@@ -1,6 +1,6 @@
 """Gaussians in the vehicle frame as tensors, their mirror image, and their colour.
 
-The library's own rules (method: mirror across y = 0), differentiable.
+The rules of the library (method: mirror across y = 0), differentiable.
 """
 
 from typing import NamedTuple
@@ -22,12 +22,12 @@ class Gaussians(NamedTuple):
     sh: torch.Tensor  # [n][(degree + 1)^2][3]
 
     def where(self, which):
-        """Those with `which` [n]."""
+        """The Gaussians selected by `which` [n]."""
         return Gaussians(*(t[which] for t in self))
 
     def mirrored(self):
         """The mirror image across y = 0. (w, x, y, z) becomes (w, -x, y, -z), the rotation M R M: the paper's
-        M R is no rotation, and gives the same covariance."""
+        M R is not a rotation, but gives the same covariance."""
         colors = self.means.new_ones(self.sh.shape[1])
         colors[[k for k in ODD_IN_Y if k < len(colors)]] = -1
         return Gaussians(

@@ -1,6 +1,6 @@
-"""LPIPS (Zhang et al. 2018) with AlexNet features, from a file of weights that the user brings.
+"""LPIPS (Zhang et al. 2018) with AlexNet features, from a file of weights that the user provides.
 
-The file is the state dict of the package `lpips`, which may not be passed on with ours:
+The file is the state dict of the package `lpips`, which must not be distributed with this repository:
 
     python -c "import lpips, torch; torch.save(lpips.LPIPS(net='alex').state_dict(), 'lpips.pth')"
 """
@@ -17,7 +17,7 @@ LAYERS = (
     (256, 256, 3, 1, 1, False),
 )
 NAMES = ("net.slice1.0", "net.slice2.3", "net.slice3.6", "net.slice4.8", "net.slice5.10")
-LEAST_SIDE = 32  # smaller pictures leave nothing after the second maximum
+LEAST_SIDE = 32  # smaller pictures are empty after the second maximum
 
 
 class Lpips(nn.Module):

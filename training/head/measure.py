@@ -1,8 +1,8 @@
-"""What a head costs in ONNX Runtime: seconds and memory, views one by one and all at once.
+"""Time and memory of a head in ONNX Runtime, views one by one and all at once.
 
     python training/head/measure.py head.onnx --views 4 --width 512 --height 384 --threads 2
 
-Each way runs in a process of its own: memory that a first run took would hide what the second needs. Linux only.
+Each variant runs in a process of its own, because memory of a first run would hide that of the second. Linux only.
 """
 
 import argparse
@@ -24,7 +24,7 @@ def main():
     parser.add_argument("--threads", type=int, default=2)
     args = parser.parse_args()
 
-    # Here, not above: the measuring processes shall hold no PyTorch.
+    # Imported here, because the measuring processes must not load PyTorch.
     from export import INPUTS, example
 
     inputs = example((args.views, args.height, args.width), 1)
@@ -59,7 +59,7 @@ def measure(args, inputs, size, queue):
 
 
 def peak_megabytes():
-    # Not getrusage: its peak starts at what the parent held when it forked.
+    # Not getrusage, whose peak starts with the parent's memory at the fork.
     status = Path("/proc/self/status").read_text()
     return int(status.split("VmHWM:")[1].split()[0]) / 1024
 

@@ -1,9 +1,9 @@
-"""The Gaussian head (paper sec. "Gaussian Attribute Estimation"): a ResNet encoder and a UNet decoder that answer
+"""The Gaussian head (paper sec. "Gaussian Attribute Estimation"): a ResNet encoder and a UNet decoder that compute
 38 raw attributes per pixel, [o 1, dp 3, q 4, s 3, h 27], from a view's picture and the prior's depth.
 
 An untrained head is the surfel solution. The last layer's weights start at zero and its bias at no rotation, and
-the raw scale is an offset from the one whose activation is the pixel's footprint: every Gaussian starts round,
-FOOTPRINT_SIGMA_PX large in its own view, where the prior puts it, in the pixel's colour, nearly opaque.
+the raw scale is an offset from the one whose activation is the pixel's footprint: every Gaussian starts round, with
+size FOOTPRINT_SIGMA_PX in its own view, at the prior's position, in the pixel's colour, nearly opaque.
 """
 
 import torch
@@ -20,14 +20,14 @@ DEPTH_SPREAD_M = 2.5  # half of a car's length: normalised depth stays near [-1,
 IMAGENET_MEAN = (0.485, 0.456, 0.406)
 IMAGENET_STD = (0.229, 0.224, 0.225)
 
-FOOTPRINT_SIGMA_PX = 0.5  # as the surfel head has it
+FOOTPRINT_SIGMA_PX = 0.5  # as in the surfel head
 SCALE_WITHOUT_DEPTH_M = 0.01
 SCALE_ACTIVATIONS = ("softplus", "sigmoid", "relu")
 DECODER_WIDTHS = {"resnet50": (256, 128, 64, 64, 32), "resnet18": (256, 128, 64, 64, 32), "tiny": (6, 6, 4, 4, 4)}
 
 
 class Head(nn.Module):
-    """Views in, raw attributes out; what an exported head computes."""
+    """Maps views to raw attributes, as an exported head does."""
 
     def __init__(self, encoder="resnet50", scale_activation="softplus", offset=True):
         super().__init__()
@@ -45,7 +45,7 @@ class Head(nn.Module):
         self.register_buffer("std", torch.tensor(IMAGENET_STD).view(1, 3, 1, 1), persistent=False)
 
     def forward(self, images, depth, intrinsics):
-        """Raw attributes [N][38][H][W] of N views, each by itself.
+        """Raw attributes [N][38][H][W] of N views, each processed independently.
 
         images [N][3][H][W] RGB in [0, 1]; depth [N][H][W] planar z in metres, 0 = none; intrinsics [N][3][3] in
         pixels. H and W are multiples of SIZE_MULTIPLE; see `predict` for other sizes."""
@@ -57,7 +57,7 @@ class Head(nn.Module):
         return torch.cat([before, scales + start, after], 1)
 
     def predict(self, images, depth, intrinsics):
-        """`forward` at any size, as a host runs it: pads right and bottom with zeros and crops the answer."""
+        """`forward` at any size, as a host runs it: pads right and bottom with zeros and crops the output."""
         height, width = depth.shape[1:]
         pad = (0, -width % SIZE_MULTIPLE, 0, -height % SIZE_MULTIPLE)
         padded = [nn.functional.pad(t, pad) for t in (images, depth)]
@@ -65,7 +65,7 @@ class Head(nn.Module):
 
 
 class Decoder(nn.Module):
-    """From the deepest features up: twice as large, the encoder's features beside, two convolutions."""
+    """Upwards from the deepest features: doubles the size, appends the encoder's features, applies two convolutions."""
 
     def __init__(self, channels, widths):
         super().__init__()
@@ -105,7 +105,7 @@ def scale_start(depth, valid, intrinsics, activation):
     return INVERSES[activation](footprint)
 
 
-# The inverses stay finite for any footprint: from below at the least scale, from above at the largest.
+# The inverses stay finite for any footprint: clamped at the smallest scale from below and the largest from above.
 
 
 def softplus_inverse(y):
@@ -131,13 +131,13 @@ INVERSES = {"softplus": softplus_inverse, "sigmoid": sigmoid_inverse, "relu": re
 
 
 def save(head, path, **more):
-    """Writes a checkpoint: weights and what is needed to build the head they belong to."""
+    """Writes a checkpoint: the weights and the settings to build their head."""
     options = {"encoder": head.encoder_name, "scale_activation": head.scale_activation, "offset": head.offset}
     torch.save({"options": options, "weights": head.state_dict(), **more}, path)
 
 
 def load(path):
-    """The head of a checkpoint, ready to answer."""
+    """The head of a checkpoint, in evaluation mode."""
     checkpoint = torch.load(path, map_location="cpu", weights_only=True)
     head = Head(**checkpoint["options"])
     head.load_state_dict(checkpoint["weights"])

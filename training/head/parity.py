@@ -1,8 +1,8 @@
-"""Writes a tiny head and what it answers, for the library's tests of running a head and of the activations.
+"""Writes a tiny head and its outputs, for the library's tests of running a head and of the activations.
 
     python training/head/parity.py tests/data/sedan -o tests/data/head
 
-`tiny_head.onnx` is the contract's graph with narrow layers and random weights; its answers mean nothing and use
+`tiny_head.onnx` is the contract's graph with narrow layers and random weights; its outputs are meaningless but use
 everything. `tiny_head.bin` holds a case, little endian:
 
     8 bytes    "VGHEAD01"
@@ -14,7 +14,7 @@ everything. `tiny_head.bin` holds a case, little endian:
     float32    raw [m][38], PyTorch's
     float32    gaussians [m][38]: mean 3, rotation 4 (w, x, y, z), scale 3, opacity 1, sh [9][3]; 0 without depth
 
-Sample k is pixel k * every of the views in order, row by row. w and h are no multiples of 32: the host pads.
+Sample k is pixel k * every of the views in order, row by row. w and h are not multiples of 32: the host pads.
 """
 
 import argparse

@@ -49,14 +49,14 @@ class Bottleneck(nn.Module):
 
 
 def shortcut(inside, outside, stride):
-    """The identity where the shapes allow it: then it has no weights, and no name in the file either."""
+    """The identity if the shapes allow it, without weights and without a name in the file."""
     if stride == 1 and inside == outside:
         return nn.Identity()
     return nn.Sequential(nn.Conv2d(inside, outside, 1, stride, bias=False), nn.BatchNorm2d(outside))
 
 
 class ResNet(nn.Module):
-    """Features at 1/2, 1/4, 1/8, 1/16 and 1/32 of the input's size; `channels` tells how many of each."""
+    """Features at 1/2, 1/4, 1/8, 1/16 and 1/32 of the input's size; `channels` has the number of each."""
 
     def __init__(self, block, counts, widths):
         super().__init__()
@@ -85,8 +85,8 @@ class ResNet(nn.Module):
         return features
 
     def load_imagenet(self, state):
-        """Takes torchvision's weights of the same depth (a state dict). The depth filter starts at zero: at
-        first the encoder sees what it has learned to see."""
+        """Loads torchvision's weights of the same depth (a state dict). The depth filter starts at zero: at
+        first the encoder sees the input it was trained on."""
         state = {name: value for name, value in state.items() if not name.startswith("fc.")}
         rgb = state.get("conv1.weight")
         expected = (self.conv1.out_channels, 3, 7, 7)

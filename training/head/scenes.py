@@ -1,8 +1,8 @@
-"""Scenes to train on: posed pictures with masks, and the prior's depth for those that may be input.
+"""Scenes for training: posed pictures with masks, and the prior's depth for those that may be input.
 
 A folder with nerfstudio's transforms.json (camera-to-world, OpenGL axes; world = vehicle frame, metres) whose frames
 name picture, mask and depth (16 bit planar z, `depth_unit_scale_factor` metres per unit, 0 = none); tests/data/sedan
-is one. Its depth stands for the frozen prior's: to train for a prior, write its depth there.
+is one. Its depth stands for that of the frozen prior: to train for a prior, write its depth there.
 """
 
 import json
@@ -13,9 +13,9 @@ import numpy as np
 import torch
 from PIL import Image
 
-MIRRORED_DISTANCE_M = 0.5  # a target nearer to a mirrored input camera would be a copied picture
+MIRRORED_DISTANCE_M = 0.5  # a target nearer to a mirrored input camera would be a copy of its picture
 SIDE_M = 0.5  # cameras nearer to the plane y = 0 see the front or the rear, not a side
-VEHICLE = 128  # least mask value
+VEHICLE = 128  # smallest mask value of the vehicle
 OPENCV_FROM_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
@@ -53,12 +53,12 @@ class Scene:
         image = open_rgb(self.path / frame["file_path"])
         mask = np.asarray(Image.open(self.path / frame["mask_path"]).convert("L")) >= VEHICLE
         height, width = mask.shape
-        # The vehicle is cut out before it is made smaller: afterwards its rim would hold the background.
+        # The vehicle is cut out before it is reduced: afterwards its rim would contain background.
         on_white = np.where(mask[..., None], image, 1.0).astype(np.float32)
         depth = None
         if "depth_file_path" in frame:
             millimetres = np.asarray(Image.open(self.path / frame["depth_file_path"]))
-            # Depth is sampled: means across an edge lie in the air.
+            # Depth is sampled, because means across an edge are on no surface.
             u, v = ((np.arange(n) + 0.5) * m / n for n, m in zip(size, (width, height), strict=True))
             depth = millimetres.astype(np.float32) * self.transforms.get("depth_unit_scale_factor", 0.001)
             depth = np.where(mask, depth, 0)[np.ix_(v.astype(int), u.astype(int))]

@@ -2,7 +2,7 @@
 
 For training at reduced resolution and for tests; the library renders everything else. The steps, in order: project,
 low-pass, sort, blend front to back, tile by tile. In training the blend of a tile is computed again in its backward
-pass, so memory holds one tile's pixels times Gaussians, not the picture's.
+pass, so memory holds the pixels times Gaussians of one tile, not of the picture.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ EXTENT_SIGMA = 3.33  # sqrt(2 ln 255) = 3.329: beyond, even an opaque Gaussian i
 MIN_ALPHA = 1 / 255
 LEAST_TRANSMITTANCE = 1e-4
 CLAMP_MARGIN = 0.15  # the Jacobian is taken inside the image plus this fraction of its size
-TILE_PX = 8  # at 96 x 72 pixels nine times faster than 16: a pixel meets fewer Gaussians that miss it
+TILE_PX = 8  # at 96 x 72 pixels nine times faster than 16: fewer Gaussians that miss the pixel
 
 
 @dataclass(frozen=True)
@@ -38,14 +38,14 @@ class Splats(NamedTuple):
 
     means: torch.Tensor  # [n][2]
     conics: torch.Tensor  # [n][3] upper triangle of the inverse covariance
-    half_sizes: torch.Tensor  # [n][2] of the box outside of which nothing shows; no gradient
+    half_sizes: torch.Tensor  # [n][2] of the box outside of which nothing is drawn; no gradient
     depths: torch.Tensor  # [n] metres
     opacities: torch.Tensor  # [n]
     colors: torch.Tensor  # [n][3]
 
 
 def render(gaussians, camera_from_vehicle, intrinsics, size, background, options=Options()):  # noqa: B008
-    """The picture seen by a camera: `camera_from_vehicle` [4][4], intrinsics [3][3], `size` (width, height),
+    """The picture of a camera: `camera_from_vehicle` [4][4], intrinsics [3][3], `size` (width, height),
     `background` [3]."""
     rotation, translation = camera_from_vehicle[:3, :3], camera_from_vehicle[:3, 3]
     colors = seen_colors(gaussians.means, gaussians.sh, -rotation.T @ translation)
@@ -55,7 +55,7 @@ def render(gaussians, camera_from_vehicle, intrinsics, size, background, options
 def project(gaussians, colors, camera_from_vehicle, intrinsics, size, options):
     rotation, translation = camera_from_vehicle[:3, :3], camera_from_vehicle[:3, 3]
     z = (gaussians.means @ rotation.T + translation)[:, 2].detach()
-    # Depths that agree in float32 keep their order, whatever the precision of the rest.
+    # Depths that are equal in float32 keep their order, whatever the precision of the rest.
     order = torch.sort(z.float(), stable=True).indices
     order = order[z[order] > options.near_m]
     means, rotations, scales, opacities = (t[order] for t in gaussians[:4])
@@ -63,7 +63,7 @@ def project(gaussians, colors, camera_from_vehicle, intrinsics, size, options):
 
     (fx, _, cx), (_, fy, cy) = intrinsics[0], intrinsics[1]
     width, height = size
-    # Far outside the image the linearised projection is meaningless; the Jacobian is taken at its rim.
+    # Far outside the image the linearised projection is meaningless; the Jacobian is evaluated at the rim.
     margin_x, margin_y = CLAMP_MARGIN * width / fx, CLAMP_MARGIN * height / fy
     tx = z * (x / z).clamp(-cx / fx - margin_x, (width - cx) / fx + margin_x)
     ty = z * (y / z).clamp(-cy / fy - margin_y, (height - cy) / fy + margin_y)
@@ -73,7 +73,7 @@ def project(gaussians, colors, camera_from_vehicle, intrinsics, size, options):
     a, b = axes.unbind(1)
     blur = options.blur_px2
     xx, xy, yy = (a * a).sum(-1), (a * b).sum(-1), (b * b).sum(-1)
-    # Cauchy-Binet: xx yy - xy^2 without its cancellation, which needles do not survive in float32.
+    # Cauchy-Binet: xx yy - xy^2 without cancellation, which would destroy needles in float32.
     determinant = (blur**2 + blur * (xx + yy) + torch.linalg.cross(a, b).square().sum(-1)).clamp(min=1e-10)
     xx, yy = xx + blur, yy + blur
     return Splats(
@@ -137,7 +137,7 @@ def blend_tile(splats, bounds, options):
     alpha = torch.where((alpha >= MIN_ALPHA) & (exponent >= 0), alpha, torch.zeros_like(alpha))
     after = torch.cumprod(1 - alpha, -1)
     before = torch.cat([torch.ones_like(after[..., :1]), after[..., :-1]], -1)
-    # The product only falls: all from the first that would end below the threshold are left out.
+    # The product only decreases: all from the first that would end below the threshold are left out.
     weight = torch.where(after > LEAST_TRANSMITTANCE, alpha * before, torch.zeros_like(alpha))
     values = torch.cat([splats.colors, torch.ones_like(splats.depths)[:, None], splats.depths[:, None]], -1)
     return weight @ values

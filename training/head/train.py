@@ -2,9 +2,9 @@
 
     python training/head/train.py SCENE... --check SCENE --imagenet resnet50.pth --lpips lpips.pth -o head.pt
 
-An iteration takes four vehicles. Of each, N input views of one side become Gaussians at the prior's points; the side
-with more of them and its mirror image are the vehicle; two views of the other side, none of them nearly a mirrored
-input, tell how wrong it looks: MSE + 0.05 LPIPS (LPIPS where a file of its weights is given). The prior is frozen: its
+An iteration uses four vehicles. For each, N input views of one side become Gaussians at the prior's points; the side
+with more of them and its mirror image are the vehicle; the loss is computed on two views of the other side, none of
+them nearly a mirrored input: MSE + 0.05 LPIPS (LPIPS if a file of its weights is given). The prior is frozen: its
 depth comes with the scenes. Pictures are reduced to --width x --height; the renderer is plain PyTorch and slow.
 """
 
@@ -36,8 +36,8 @@ def main():
     parser.add_argument("--no-offset", action="store_true")
     parser.add_argument("--imagenet", help="torchvision's weights of the encoder")
     parser.add_argument("--lpips", help="see lpips.py")
-    parser.add_argument("--resume", help="checkpoint to go on from; replaces the three options of the head")
-    parser.add_argument("--iterations", type=int, default=300, help="0 only checks")
+    parser.add_argument("--resume", help="checkpoint to continue from; replaces the three options of the head")
+    parser.add_argument("--iterations", type=int, default=300, help="0: only check")
     parser.add_argument("--batch", type=int, default=4, help="vehicles per iteration")
     parser.add_argument("--views", type=int, default=4)
     parser.add_argument("--targets", type=int, default=2)
@@ -87,11 +87,11 @@ def draw(scenes, random, batch, views, targets):
 
 
 def backward(head, draws, perceptual):
-    """Adds the gradients of one batch of (inputs, targets) per vehicle; its loss, mean of the vehicles."""
+    """Adds the gradients of one batch of (inputs, targets) per vehicle. Returns the mean loss of the vehicles."""
     head.train()
-    # All vehicles pass the head together: the batch normalisation must not see one vehicle's statistics alone.
+    # All vehicles pass the head together: the batch normalisation must not use the statistics of a single vehicle.
     raw = predict(head, [frame for inputs, _ in draws for frame in inputs])
-    # The renderer's graph is the large one; so it lives for one vehicle at a time.
+    # The renderer's graph is the large one, so it exists for one vehicle at a time.
     leaf = raw.detach().requires_grad_()
     total = 0.0
     for (inputs, targets), attributes in zip(draws, leaf.split(len(draws[0][0])), strict=True):
@@ -104,8 +104,8 @@ def backward(head, draws, perceptual):
 
 @torch.no_grad()
 def settle(head, scenes, random, batch, views):
-    """Statistics of the batch normalisation afresh, as means over batches: the running ones lag behind weights
-    that have just moved, and after 300 iterations that shows."""
+    """Recomputes the statistics of the batch normalisation as means over batches: the running ones lag behind weights
+    that have just changed, visibly so after 300 iterations."""
     norms = [module for module in head.modules() if isinstance(module, torch.nn.BatchNorm2d)]
     momenta = [norm.momentum for norm in norms]
     for norm in norms:
@@ -120,7 +120,7 @@ def settle(head, scenes, random, batch, views):
 
 
 def predict(head, inputs):
-    """Raw attributes [n][38][H][W] of input frames. The prior's depth is the head's input inside the mask only."""
+    """Raw attributes [n][38][H][W] of input frames. The head gets the prior's depth inside the mask only."""
     stack = lambda key: torch.stack([getattr(frame, key) for frame in inputs])
     return head.predict(stack("image"), stack("depth") * stack("mask"), stack("intrinsics"))
 

@@ -1,4 +1,4 @@
-"""Reads what `vehicle-gaussians-training data` wrote."""
+"""Reads the output of `vehicle-gaussians-training data`."""
 
 import numpy as np
 import torch
@@ -15,7 +15,7 @@ def open_records(path):
 
 
 def batch(records, indices):
-    """hull [n][16][32][96] in units of 0.5 m, distance likewise in units of 0.25 m, numbers [n][11]."""
+    """hull [n][16][32][96] in units of 0.5 m, distance in units of 0.25 m, numbers [n][11]."""
     rows = [records[i] for i in indices]
     stack = lambda key: torch.from_numpy(np.stack([row[key] for row in rows]).astype(np.float32))
     return stack("hull") / 127, stack("distance") / 127, stack("numbers")

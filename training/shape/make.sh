@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes src/prior/shape/weights.bin again, from nothing: vehicles, training, parity data.
+# Makes crates/vehicle-gaussians/src/prior/shape/weights.bin from scratch: vehicles, training, parity data.
 # Usage: training/shape/make.sh PYTHON
 set -eu
 python=${1:?the Python with training/shape/requirements.txt installed}
@@ -12,6 +12,6 @@ vehicles() {
 vehicles --vehicles 3072 --seed 1 -o "$work/train.bin"
 vehicles --vehicles 300 --seed 1000 -o "$work/check.bin"
 PYTHONPATH=training/shape "$python" training/shape/train.py "$work/train.bin" --check "$work/check.bin" \
-    -o src/prior/shape/weights.bin
-PYTHONPATH=training/shape "$python" training/shape/parity.py src/prior/shape/weights.bin "$work/check.bin" \
+    -o crates/vehicle-gaussians/src/prior/shape/weights.bin
+PYTHONPATH=training/shape "$python" training/shape/parity.py crates/vehicle-gaussians/src/prior/shape/weights.bin "$work/check.bin" \
     -o tests/data/shape/parity.bin

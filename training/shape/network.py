@@ -1,8 +1,8 @@
-"""The shape network: from the hull that silhouettes carve to the vehicle's signed distance.
+"""The shape network: from the visual hull to the vehicle's signed distance.
 
-A U-Net over (z, x); the slices along |y| are its channels, so it sees a column of the vehicle at once and its
-length and height by convolution. It answers a correction of the hull's signed distance and, per node, how far it
-may be off (the scale of a Laplace distribution).
+A U-Net over (z, x); the slices along |y| are its channels, so it sees a whole column of the vehicle at once, and
+length and height by convolution. Its outputs are a correction of the hull's signed distance and, per node, the
+expected error (the scale of a Laplace distribution).
 """
 
 import torch
@@ -10,13 +10,13 @@ from torch import nn
 
 NODES = (16, 32, 96)  # |y|, z, x
 NUMBERS = 11
-CLAMP_M = 0.25  # metres per unit of the answer; distances beyond are not told apart
+CLAMP_M = 0.25  # metres per unit of the output; distances beyond are not distinguished
 WIDTHS = (32, 48, 64, 96)
 LEAST_SCALE, MOST_SCALE = -4.0, 1.0  # logarithms of the Laplace scale, units of CLAMP_M
 
 
 def block(inside, outside, kernel, stride=1):
-    # The normalisation is folded into the convolution when the weights are written.
+    # The normalisation is merged into the convolution when the weights are written.
     return nn.Sequential(
         nn.Conv2d(inside, outside, kernel, stride, kernel // 2, bias=False), nn.BatchNorm2d(outside), nn.ReLU()
     )
@@ -54,7 +54,7 @@ class UNet(nn.Module):
 
 
 class ColumnMlp(nn.Module):
-    """The rival: the same numbers, but every column along |y| by itself."""
+    """The alternative: the same input, but every column along |y| independently."""
 
     def __init__(self, hidden=160):
         super().__init__()

@@ -1,8 +1,8 @@
-"""Writes what the trained network answers to one scene, for the library's test of its own evaluation.
+"""Writes the trained network's output for one scene, for the library's test of its own evaluation.
 
     python parity.py weights.bin check.bin -o ../../tests/data/shape/parity.bin
 
-Little endian: the hull as int8 [16][32][96], the view numbers float32 [11], then every 29th value of the raw answer
+Little endian: the hull as int8 [16][32][96], the view numbers float32 [11], then every 29th value of the raw output
 [32][32][96] as float32.
 """
 

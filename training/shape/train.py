@@ -2,7 +2,7 @@
 
     python train.py train.bin --check check.bin -o ../../src/prior/shape/weights.bin
 
-The same data, seed, number of threads, versions and kind of processor give the same bytes.
+Equal data, seed, number of threads, versions and kind of processor give equal bytes.
 """
 
 import argparse
@@ -62,9 +62,9 @@ def main():
 
 
 def laplace(found, scale, truth):
-    """Negative logarithm of the likelihood, mostly near the surface."""
+    """Negative log-likelihood, weighted towards the surface."""
     error = found - truth
-    # Truth beyond the clamp is a bound.
+    # A true value beyond the clamp is only a bound.
     fine = ((truth >= 1) & (found > 1)) | ((truth <= -1) & (found < -1))
     error = torch.where(fine, torch.zeros_like(error), error.abs())
     weight = torch.where(truth.abs() < 0.7, 1.0, 0.15)
@@ -85,15 +85,15 @@ def check(network, path):
         near = distance.abs() < 0.2
         for k, row in enumerate(rows):
             off = lambda a: (a[k].clamp(-1, 1) - distance[k]).abs()[near[k]].mean().item() * 100 * CLAMP_M
-            told = scale[k].exp()[near[k]].mean().item() * 100 * CLAMP_M
-            errors.setdefault(names[records[row]["class"]], []).append((off(2 * hull), off(found), told))
+            expected = scale[k].exp()[near[k]].mean().item() * 100 * CLAMP_M
+            errors.setdefault(names[records[row]["class"]], []).append((off(2 * hull), off(found), expected))
     network.train()
     everything = sum(errors.values(), [])
     errors["all"] = everything
     for name in names + ["all"]:
         if name in errors:
-            hull, found, told = np.nanmean(errors[name], 0)
-            print(f"  {name:10} hull {hull:6.2f} cm, network {found:6.2f} cm, told {told:6.2f} cm", flush=True)
+            hull, found, expected = np.nanmean(errors[name], 0)
+            print(f"  {name:10} hull {hull:6.2f} cm, network {found:6.2f} cm, expected {expected:6.2f} cm", flush=True)
 
 
 if __name__ == "__main__":

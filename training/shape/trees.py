@@ -1,4 +1,4 @@
-"""The other rival of the network: boosted trees over what one node and its neighbours know.
+"""Another alternative to the network: boosted trees over the values of one node and its neighbours.
 
     python trees.py train.bin --check check.bin      # needs scikit-learn as well
 """
@@ -15,7 +15,7 @@ NODES_PER_SCENE = 150
 
 
 def features(record, at):
-    """Hull in a neighbourhood of up to two nodes, place on the lattice, view numbers. [n][...]"""
+    """Hull in a neighbourhood of up to two nodes, position on the lattice, view numbers. [n][...]"""
     hull = np.pad(record["hull"].astype(np.float32) / 127, 2, mode="edge")
     j, k, i = at
     steps = [(a, b, c) for a in (-2, -1, 0, 1, 2) for b in (-2, -1, 0, 1, 2) for c in (-2, -1, 0, 1, 2)]

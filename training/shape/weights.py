@@ -1,4 +1,4 @@
-"""Writes a trained network for the library: convolutions with their normalisation folded in, as float16.
+"""Writes a trained network for the library: convolutions with their normalisation merged in, as float16.
 
 For each layer, little endian: channels out and in, kernel side (uint16 each), weights [out][in][k][k], biases [out].
 """
@@ -28,7 +28,7 @@ def write(network, path):
 
 
 def read_into(path):
-    """The U-Net as the library evaluates it: the file's float16 weights, no normalisation left."""
+    """The U-Net as the library evaluates it: the file's float16 weights, without normalisation."""
     import torch
 
     from network import UNet

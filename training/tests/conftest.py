@@ -1,4 +1,4 @@
-"""Runs the export programs without the library: they need none of it, and a training machine may not have it built.
+"""Runs the export programs without the library, which they do not need and a training machine may not have.
 
 pip install -r training/requirements-export.txt
 python -m pytest training/tests
@@ -22,7 +22,7 @@ _parent = types.ModuleType("vehicle_gaussians")
 _parent.__path__ = [str(PACKAGE)]
 sys.modules["vehicle_gaussians"] = _parent
 
-#: The same in a new interpreter, in which the modules named before "--" cannot be imported.
+#: Script for a new interpreter in which the modules named before "--" cannot be imported.
 LAUNCHER = """
 import runpy, sys, types
 package, rest = sys.argv[1], sys.argv[2:]
@@ -41,7 +41,7 @@ runpy.run_module("vehicle_gaussians.export." + program, run_name="__main__", alt
 
 
 def stored_once(model: Any, prefix: str = "") -> dict[str, Any]:
-    """Tensors as the published weights hold them: each once, under one of its names."""
+    """Tensors as in the published weights: each once, under one of its names."""
     tensors: dict[int, tuple[str, Any]] = {}
     for name, tensor in model.state_dict(keep_vars=True).items():
         tensors.setdefault(tensor.data_ptr(), (prefix + name, tensor.detach().contiguous()))
@@ -58,7 +58,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Program:
 
     def start(name: str, *arguments: str, without: tuple[str, ...] = ()) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-c", LAUNCHER, str(PACKAGE), *without, "--", name, *arguments]
-        # Nothing may be downloaded: a proxy that is not there, and caches that are empty.
+        # Prevents downloads by a proxy that does not exist and empty caches.
         refused = {"https_proxy": "http://127.0.0.1:9", "http_proxy": "http://127.0.0.1:9"}
         empty = {"HOME": str(home), "TORCH_HOME": str(home), "HF_HOME": str(home), "HF_HUB_ETAG_TIMEOUT": "2"}
         path = {"PATH": "/usr/bin:/bin"}

@@ -1,4 +1,4 @@
-"""The check of a finished file: what it accepts, and its words for what it refuses."""
+"""The check of a finished file: what it accepts, and its messages for what it refuses."""
 
 from __future__ import annotations
 
@@ -164,14 +164,14 @@ def test_operators_that_only_some_runtimes_have_are_refused(tmp_path: Path) -> N
     assert refusal(path) == "node first: com.microsoft::Identity; allowed: standard operators"
 
 
-def test_what_is_no_onnx_file_is_said_to_be_none(tmp_path: Path) -> None:
+def test_other_files_are_refused_as_not_onnx(tmp_path: Path) -> None:
     path = tmp_path / "prior.onnx"
     assert refusal(path) == "cannot be read: No such file or directory"
     path.write_bytes(b"ply\nformat ascii 1.0\n")
     assert refusal(path) == "not an ONNX file"
 
 
-def test_a_perceptual_distance_has_a_contract_of_its_own(tmp_path: Path) -> None:
+def test_a_perceptual_distance_has_its_own_contract(tmp_path: Path) -> None:
     good: tuple[Shapes, Shapes] = {"a": IMAGES, "b": IMAGES}, {"lpips": ["N"]}
     assert contract.check(written(tmp_path, *good, PERCEPTUAL)) == PERCEPTUAL
     wrong = PERCEPTUAL | {"vg.lpips.net": "resnet"}

@@ -1,4 +1,4 @@
-"""The wrapper around Depth Anything 3, its smallest architecture with random weights; skipped where it is not there."""
+"""The wrapper around the smallest Depth Anything 3 with random weights; skipped if it is not installed."""
 
 from __future__ import annotations
 
@@ -27,29 +27,29 @@ def random_network() -> Any:
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(3)
         made = depth_anything_3_network.built("da3-small").eval()
-        # Zero initially, and so without a say.
+        # Initially zero, which would have no effect.
         torch.nn.init.normal_(made.backbone.pretrained.pos_embed, std=0.1)
         return made
 
 
 @pytest.mark.parametrize("views", [1, 4, 5])
-def test_the_wrapper_answers_what_upstream_does(views: int) -> None:
+def test_the_wrapper_gives_the_results_of_upstream(views: int) -> None:
     inputs = graph.example_inputs(views, WIDTH, HEIGHT, seed=5)
     upstream = upstream_answer(random_network(), inputs)
     module = depth_anything_3_network.DepthAnything3Prior(random_network(), (WIDTH, HEIGHT))
     with torch.no_grad():
         depth, confidence, poses = module(*inputs.values())
-    close = {"rtol": 2e-5, "atol": 2e-5}  # float32 in another order of additions
+    close = {"rtol": 2e-5, "atol": 2e-5}  # float32 sums in another order
     torch.testing.assert_close(depth, upstream["depth"][0], **close)
     torch.testing.assert_close(confidence, upstream["depth_conf"][0], **close)
     last_row = torch.tensor([[[0.0, 0.0, 0.0, 1.0]]]).expand(views, 1, 4)
-    # Upstream answers camera_from_world.
+    # Upstream returns camera_from_world.
     cameras = torch.linalg.inv(torch.cat([upstream["extrinsics"][0][:, :3], last_row], 1).double())
     torch.testing.assert_close(poses.double(), torch.linalg.inv(cameras[0]) @ cameras, rtol=1e-4, atol=1e-4)
 
 
 def upstream_answer(network: Any, inputs: dict[str, Any]) -> Any:
-    """Normalised as its interface does: world is view 0, distances in units of their median."""
+    """Normalised as its interface does: the world is view 0, distances are in units of their median."""
     mean, std = (torch.tensor(values).view(3, 1, 1) for values in (graph.IMAGENET_MEAN, graph.IMAGENET_STD))
     world_from_camera = inputs["cam_to_ref"].clone()
     world_from_camera[:, :3, 3] /= world_from_camera[:, :3, 3].norm(dim=-1).median().clamp(min=0.1)

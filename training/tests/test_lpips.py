@@ -1,4 +1,4 @@
-"""The perceptual distance with a random backbone; skipped where the lpips package is not there."""
+"""The perceptual distance with a random backbone; skipped if the lpips package is not installed."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def distances(file: Path, a: torch.Tensor, b: torch.Tensor) -> np.ndarray:
 
 
 @pytest.mark.parametrize("net", ["alex", "squeeze"])
-def test_the_file_answers_as_the_package_does_at_any_size(net: str, tmp_path: Path) -> None:
+def test_the_file_gives_the_results_of_the_package_at_any_size(net: str, tmp_path: Path) -> None:
     model = lpips_network.built(net)
     backbone = stored_backbone(model, tmp_path)
     path = tmp_path / "lpips.onnx"

@@ -1,4 +1,4 @@
-"""The wrapper around the public MapAnything class, with small random weights; skipped where the class is not there.
+"""The wrapper around the public MapAnything class, with small random weights; skipped if the class is not installed.
 
 The code of DINOv2 comes through torch.hub: from GitHub, or from the cache that TORCH_HOME names.
 """
@@ -37,18 +37,18 @@ def model() -> Any:
             pytest.skip(str(error))
         for name, parameter in made.named_parameters():
             if name.endswith("gamma"):
-                # Initially 1e-5: no block would have a say.
+                # Initially 1e-5, with which no block would have an effect.
                 torch.nn.init.uniform_(parameter, 0.3, 0.6)
     return made.eval()
 
 
-def test_the_wrapper_answers_what_upstream_infers(model: Any) -> None:
+def test_the_wrapper_gives_the_results_of_upstream(model: Any) -> None:
     inputs = graph.example_inputs(3, WIDTH, HEIGHT, seed=5)
     upstream = infer(model, inputs)
     module = graph.MultiViewPrior(mapanything_network.MapAnythingNetwork(model, (WIDTH, HEIGHT)))
     with torch.no_grad():
         depth, rays, scale, confidence, mask, poses = module(*inputs.values())
-    # float32 in another order of additions.
+    # float32 sums in another order.
     close = {"rtol": 2e-5, "atol": 2e-5}
     torch.testing.assert_close(depth * scale, upstream["depth_along_ray"][..., 0], **close)
     torch.testing.assert_close(rays, upstream["ray_directions"], **close)

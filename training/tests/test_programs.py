@@ -1,4 +1,4 @@
-"""The programs where something is missing: one line that says what and what helps, exit code 2, no traceback."""
+"""The programs with something missing: one line with the cause and the remedy, exit code 2, no traceback."""
 
 from __future__ import annotations
 
@@ -57,13 +57,13 @@ def test_a_package_that_lacks_another_names_both(program: Program) -> None:
 
 
 @pytest.mark.parametrize("name", ["tiny", "mapanything", "depth_anything_3"])
-def test_a_size_that_is_no_multiple_of_a_patch_is_refused(program: Program, name: str) -> None:
+def test_a_size_that_is_not_a_multiple_of_a_patch_is_refused(program: Program, name: str) -> None:
     done = program(name, "--size", "512x384", without=HEAVY)
     assert done.returncode == 2
     assert done.stderr == f"vehicle_gaussians.export.{name}: error: --size: 512x384; allowed: multiples of 14\n"
 
 
-def test_weights_that_cannot_be_had_are_named_with_the_command_that_gets_them(program: Program) -> None:
+def test_unavailable_weights_are_named_with_the_command_to_get_them(program: Program) -> None:
     pytest.importorskip("depth_anything_3.model.da3")
     done = program("depth_anything_3")
     assert done.returncode == 2 and "Traceback" not in done.stderr
@@ -88,7 +88,7 @@ def test_weights_of_unknown_licence_need_one(program: Program, tmp_path: Path) -
     assert f"error: --license: missing; the licence of {tmp_path} is not known here, known are: depth-" in done.stderr
 
 
-def test_a_backbone_that_cannot_be_had_is_named_with_its_address(program: Program) -> None:
+def test_an_unavailable_backbone_is_named_with_its_address(program: Program) -> None:
     pytest.importorskip("lpips")
     done = program("lpips", "--net", "squeeze")
     assert done.returncode == 2 and "Traceback" not in done.stderr
@@ -98,7 +98,7 @@ def test_a_backbone_that_cannot_be_had_is_named_with_its_address(program: Progra
     ) in done.stderr
 
 
-def test_a_backbone_file_that_is_not_there_is_refused_first(program: Program) -> None:
+def test_a_missing_backbone_file_is_refused_first(program: Program) -> None:
     done = program("lpips", "--backbone", "missing.pth", without=HEAVY)
     assert done.returncode == 2
     assert done.stderr == "vehicle_gaussians.export.lpips: error: --backbone: missing.pth: no such file\n"

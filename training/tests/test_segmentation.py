@@ -1,4 +1,4 @@
-"""The segmentation with random weights; skipped where torchvision is not there."""
+"""The segmentation with random weights; skipped if torchvision is not installed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The way from a network to a file, with the tiny network: what is exported, stamped, checked and compared."""
+"""The steps from a network to a file, with the tiny network: export, metadata, check and comparison."""
 
 from __future__ import annotations
 
@@ -40,17 +40,17 @@ def run(file: Path, inputs: dict[str, Any]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("views", [1, 2, 3, 4])
-def test_traced_with_two_views_it_answers_as_torch_does_for_any_number(file: Path, module: Any, views: int) -> None:
+def test_traced_with_two_views_it_gives_torchs_results_for_any_number(file: Path, module: Any, views: int) -> None:
     inputs = graph.example_inputs(views, WIDTH, HEIGHT, seed=11)
     with torch.no_grad():
         expected = module(*inputs.values())
     answers = run(file, inputs)
     for name, reference in zip(OUTPUTS, expected, strict=True):
-        # float32: the order of additions differs.
+        # float32: the order of sums differs.
         np.testing.assert_allclose(answers[name], reference.numpy(), rtol=0, atol=1e-5, err_msg=name)
 
 
-def test_the_answers_pass_the_checks_of_a_host(file: Path) -> None:
+def test_the_outputs_pass_the_checks_of_a_host(file: Path) -> None:
     inputs = graph.example_inputs(3, WIDTH, HEIGHT, seed=2)
     answers = run(file, inputs)
     assert all(np.isfinite(answer).all() for answer in answers.values())

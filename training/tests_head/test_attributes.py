@@ -1,4 +1,4 @@
-"""The same claims and numbers as the tests of src/head/attributes.rs."""
+"""The claims and numbers of the tests of crates/vehicle-gaussians/src/head/attributes.rs."""
 
 import math
 
@@ -19,7 +19,7 @@ def activated(raw, offset=True):
     return activate(raw, POINT, TURN, RGB, "softplus", offset)
 
 
-def test_zero_attributes_show_the_pixels_colour_at_the_lifted_point():
+def test_zero_attributes_give_the_pixels_colour_at_the_lifted_point():
     g = activated(torch.zeros(1, 38))
     assert torch.equal(g.means, POINT)
     assert g.rotations.tolist() == [[1, 0, 0, 0]]
@@ -28,7 +28,7 @@ def test_zero_attributes_show_the_pixels_colour_at_the_lifted_point():
     torch.testing.assert_close(0.5 + Y0 * g.sh[:, 0], RGB, rtol=0, atol=1e-6)
 
 
-def test_the_offset_turns_with_the_camera_and_can_be_switched_off():
+def test_the_offset_rotates_with_the_camera_and_can_be_switched_off():
     raw = torch.zeros(1, 38)
     raw[0, 1] = 0.1
     expected = torch.tensor([[1 + 0.1 * C, 2 + 0.1 * S, 3.0]])
@@ -57,7 +57,7 @@ def test_raw_values_of_ten_thousand_stay_finite_and_in_bounds(value):
         assert torch.tensor(SCALE_BOUNDS[0]).item() <= found <= SCALE_BOUNDS[1]
 
 
-def test_a_zero_quaternion_means_no_rotation_and_sends_no_bad_gradient():
+def test_a_zero_quaternion_means_no_rotation_and_has_a_finite_gradient():
     for value in (0.0, 1e-30, 1e30):
         raw = torch.full((1, 38), 1.0)
         raw[0, 4:8] = value

@@ -15,7 +15,7 @@ def some_head(encoder, activation, offset=True):
     ("encoder", "activation"),
     [("tiny", "softplus"), ("tiny", "sigmoid"), ("tiny", "relu"), ("resnet18", "softplus")],
 )
-def test_onnx_runtime_answers_what_pytorch_does(tmp_path, encoder, activation):
+def test_onnx_runtime_gives_the_results_of_pytorch(tmp_path, encoder, activation):
     head = some_head(encoder, activation)
     write(head, tmp_path / "head.onnx", "random, seed 1", "MIT")
     session = open_session(tmp_path / "head.onnx")
@@ -24,7 +24,7 @@ def test_onnx_runtime_answers_what_pytorch_does(tmp_path, encoder, activation):
         assert worst < 1e-4 and largest > 1
 
 
-def test_the_file_says_what_a_host_must_know(tmp_path):
+def test_the_file_has_the_metadata_for_a_host(tmp_path):
     head = some_head("tiny", "relu", offset=False)
     write(head, tmp_path / "head.onnx", "random, seed 1", "MIT")
     model = onnx.load(tmp_path / "head.onnx")

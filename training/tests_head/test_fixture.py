@@ -1,4 +1,4 @@
-"""tests/data/head as parity.py documents it: what is committed is what the code computes."""
+"""tests/data/head as documented in parity.py: the committed files equal the results of the code."""
 
 import numpy as np
 import onnxruntime
@@ -29,7 +29,7 @@ def case():
     return out
 
 
-def test_the_stored_head_answers_the_stored_attributes(case):
+def test_the_stored_head_gives_the_stored_attributes(case):
     n, h, w, _ = case["images"].shape
     assert h % 32 and w % 32
     images = np.zeros((n, 3, -h // 32 * -32, -w // 32 * -32), np.float32)
@@ -46,7 +46,7 @@ def test_the_stored_head_answers_the_stored_attributes(case):
 
 
 def test_the_stored_gaussians_follow_from_the_stored_attributes(case):
-    """In float64, written apart from the code that wrote the file."""
+    """In float64, independent of the code that wrote the file."""
     n, h, w, _ = case["images"].shape
     pixels = np.arange(n * h * w)[:: case["every"]]
     view, v, u = np.unravel_index(pixels, (n, h, w))

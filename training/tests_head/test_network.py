@@ -17,7 +17,7 @@ def test_any_size_is_padded_and_cropped(encoder):
         assert head.predict(*inputs).shape == (2, CHANNELS, 33, 47)
 
 
-def test_padding_is_what_the_contract_says():
+def test_padding_follows_the_contract():
     head = Head("tiny").eval()
     torch.nn.init.normal_(head.last.weight, std=0.1)
     images, depth, intrinsics = example((1, 30, 40), 1)
@@ -28,14 +28,14 @@ def test_padding_is_what_the_contract_says():
         assert torch.equal(head.predict(images, depth, intrinsics), expected)
 
 
-def test_every_view_is_answered_by_itself():
+def test_every_view_is_processed_independently():
     head = Head("tiny").eval()
     torch.nn.init.normal_(head.last.weight, std=0.1)
     inputs = example((3, 32, 64), 1)
     with torch.no_grad():
         together = head(*inputs)
         alone = torch.cat([head(*(t[i : i + 1] for t in inputs)) for i in range(3)])
-    # Convolutions of another batch size sum in another order.
+    # Convolutions with another batch size sum in another order.
     torch.testing.assert_close(together, alone, rtol=0, atol=1e-5)
 
 
@@ -73,7 +73,7 @@ def test_the_scale_starts_finite_at_any_depth_and_focal_length(activation):
             assert head(images, depth, intrinsics).isfinite().all()
 
 
-def test_views_without_depth_are_answered():
+def test_views_without_depth_are_processed():
     images, depth, intrinsics = example((1, 32, 32), 1)
     with torch.no_grad():
         assert Head("tiny").eval()(images, torch.zeros_like(depth), intrinsics).isfinite().all()
@@ -93,7 +93,7 @@ def test_a_checkpoint_gives_the_same_head_back(tmp_path):
 
 
 IMAGENET_LAYOUTS = {
-    # Parameters and buffers of torchvision's files, without the classifier: what they are known by.
+    # Names of the parameters and buffers in torchvision's files, without the classifier.
     "resnet18": (120, {"layer4.1.conv2.weight": (512, 512, 3, 3), "layer2.0.downsample.0.weight": (128, 64, 1, 1)}),
     "resnet50": (318, {"layer4.2.conv3.weight": (2048, 512, 1, 1), "layer1.0.downsample.1.bias": (256,)}),
 }

@@ -1,6 +1,6 @@
-"""The renderer against numbers of an independent one, and the mirror rule seen in pictures.
+"""The renderer compared with an independent one, and the mirror rule in pictures.
 
-`VG_GSPLAT_GOLDEN` or `../shared/data/gsplat_golden` holds the reference renders, as for tests/render_golden.rs.
+`VG_GSPLAT_GOLDEN` or `../shared/data/gsplat_golden` holds the reference renders, as for crates/vg-splat/tests/render_golden.rs.
 """
 
 import os
@@ -57,7 +57,7 @@ def test_pictures_agree_with_the_reference(name, suffix, options):
             assert max(color.max(), alpha.max()) < 1e-7
             torch.testing.assert_close(found.depth, tensor(f"depth_cam0{suffix}"), rtol=1e-6, atol=1e-7)
         else:
-            # Thresholds flip under rounding: tight for nearly all, loose for the rest.
+            # Thresholds flip under rounding: tight for nearly all pixels, loose for the rest.
             assert color.mean() < 1e-6 and color.sort().values[int(0.999 * len(color))] < 2e-5 and color.max() < 4e-3
 
 
@@ -72,7 +72,7 @@ def test_gradients_agree_with_the_reference():
             gradients = torch.autograd.grad(loss, leaves, retain_graph=True, allow_unused=True)
             for name, gradient in zip(("means", "quats", "scales", "opacities", "sh"), gradients, strict=True):
                 expected = tensor(f"grad_{channel}_{name}")
-                if gradient is None:  # alpha and depth do not know colours
+                if gradient is None:  # alpha and depth do not depend on colours
                     gradient = torch.zeros_like(expected)
                 assert (gradient - expected).norm() <= tolerance * expected.norm(), (channel, name)
 
@@ -99,7 +99,7 @@ def camera(kind=torch.float64):
     return pose, torch.tensor([[70.0, 0, 31], [0, 75, 22], [0, 0, 1]], dtype=kind)
 
 
-def test_mirrored_gaussians_from_the_mirrored_camera_are_the_flipped_picture():
+def test_mirrored_gaussians_from_the_mirrored_camera_give_the_flipped_picture():
     size, white = (64, 48), torch.ones(3, dtype=torch.float64)
     g = some_gaussians()
     pose, intrinsics = camera()
@@ -147,14 +147,14 @@ def test_the_denser_side_becomes_both_sides():
     assert torch.equal(full.means[len(right.means) :], right.mirrored().means)
 
 
-def test_equal_sides_go_by_the_input_cameras_then_left():
+def test_equal_sides_are_decided_by_the_input_cameras_then_left():
     g = some_gaussians(2)
     g = g._replace(means=torch.tensor([[0, 1.0, 0], [0, -1.0, 0]], dtype=torch.float64))
     assert g.completed([-1, -1, 1]).means[0, 1] == -1
     assert g.completed([1, -1]).means[0, 1] == 1
 
 
-def test_nothing_to_show_is_the_background_and_alpha_zero():
+def test_an_empty_scene_gives_the_background_and_alpha_zero():
     pose, intrinsics = camera()
     empty = some_gaussians().where(slice(0, 0))
     found = render(empty, pose, intrinsics, (17, 5), torch.tensor([0.2, 0.3, 0.4], dtype=torch.float64))

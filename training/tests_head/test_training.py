@@ -25,7 +25,7 @@ def test_lifted_points_of_one_view_fall_on_the_vehicle_in_another(sedan):
         points_camera = (points - b.center) @ b.vehicle_from_camera[:3, :3]
         pixels = points_camera @ b.intrinsics.T
         u, v = (pixels[:, :2] / pixels[:, 2:]).floor().long().unbind(1)
-        # Pixels of the rim may miss by one.
+        # Pixels at the rim may be off by one.
         grown = torch.nn.functional.max_pool2d(b.mask.float()[None], 3, 1, 1)[0] > 0
         assert grown[v, u].float().mean() > 0.99
 
@@ -34,11 +34,11 @@ def test_sides_come_from_the_cameras(scene):
     assert [frame.side for frame in scene.frames] == [-1] * 4 + [1] * 4
 
 
-def test_targets_are_of_the_other_side_and_no_mirrored_inputs(scene):
+def test_targets_are_of_the_other_side_and_not_mirrored_inputs(scene):
     random = np.random.default_rng(1)
     inputs, targets = scene.draw(random, 4, 2)
     assert {f.side for f in inputs} == {-1} and {f.side for f in targets} == {1} and len(targets) == 2
-    # A target that stands where a mirrored input does is never drawn.
+    # A target at the position of a mirrored input is never drawn.
     copy = scene.frames[4].vehicle_from_camera
     copy[:3, 3] = scene.frames[0].center * torch.tensor([1, -1, 1]) + 0.2
     assert nearly_mirrored(scene.frames[4], inputs)
@@ -78,7 +78,7 @@ def test_training_lowers_the_loss_and_keeps_the_unseen_side(scene):
 
 
 def test_gradients_of_the_vehicles_add_up_to_the_batchs(scene):
-    """The head's graph is left once for all vehicles; that must be the plain gradient."""
+    """The head's graph is evaluated backwards once for all vehicles, which must give the plain gradient."""
     head = Head("tiny").double()
     torch.nn.init.normal_(head.last.weight, std=0.01)
     for frame in scene.frames:

@@ -1,4 +1,5 @@
-//! Alignment of an arbitrary gauge to the vehicle's frame: on vehicles of boxes made here, and on ray-traced ones.
+//! Alignment of worlds of arbitrary position, rotation and scale to the vehicle's frame, on vehicles made of boxes and
+//! on ray-traced ones.
 
 use glam::{DMat3, DVec3};
 use std::path::{Path, PathBuf};
@@ -9,7 +10,7 @@ use vg::scene::Cloud;
 use vg_testing::boxes::{car, cloud, gauge, hatchback, inverse, scan, sparse, symmetric, views};
 use vg_testing::say;
 
-/// Scale error (1), rotation error (degrees), and how far the vehicle's middle is moved (metres).
+/// Scale error (1), rotation error (degrees), and shift of the vehicle's middle (metres).
 fn errors(found: &Similarity, truth: &Similarity) -> (f64, f64, f64) {
     let scale = found.scale / truth.scale - 1.0;
     let r: DMat3 = found.rotation * truth.rotation.transpose();
@@ -19,14 +20,14 @@ fn errors(found: &Similarity, truth: &Similarity) -> (f64, f64, f64) {
     (scale, angle, found.transform_point(middle).length())
 }
 
-/// Half a percent, half a degree, three centimetres.
+/// Asserts half a per cent, half a degree, three centimetres.
 fn assert_close(what: &str, found: &Similarity, truth: &Similarity) {
     let (scale, angle, position) = errors(found, truth);
     let close = scale.abs() <= 0.005 && angle <= 0.5 && position <= 0.03;
     assert!(close, "{what}: scale {:+.3} %, {angle:.3} degrees, {position:.4} m", 100.0 * scale);
 }
 
-/// The same vehicle with front and back exchanged.
+/// The similarity with front and back exchanged.
 fn turned(s: &Similarity) -> Similarity {
     let half = DMat3::from_rotation_z(std::f64::consts::PI);
     Similarity { rotation: half * s.rotation, translation: half * s.translation, ..*s }
@@ -39,7 +40,7 @@ fn a_noisy_scan_with_strays_is_found_from_any_gauge() {
     for seed in 0..4 {
         let truth = gauge(seed);
         let views = views(&shape, 12, &truth);
-        // Half of the gauges have no sparse points at all.
+        // Half of the worlds have no sparse points at all.
         let sparse = if seed % 2 == 0 { sparse(&shape, &truth, seed) } else { Vec::new() };
         let found = to_scan(&views, &sparse, &points, Heading::Auto).unwrap();
         assert_close(&format!("gauge {seed}"), &found.vehicle_from_world, &truth);
@@ -64,7 +65,7 @@ fn the_result_does_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn equal_ends_are_refused_until_somebody_says_which_is_the_front() {
+fn equal_ends_are_refused_unless_a_heading_is_given() {
     let (shape, truth) = (symmetric(), gauge(2));
     let (views, sparse) = (views(&shape, 12, &truth), sparse(&shape, &truth, 2));
     let points = cloud(&scan(&shape, 12_000, 2));
@@ -81,8 +82,8 @@ fn equal_ends_are_refused_until_somebody_says_which_is_the_front() {
 }
 
 #[test]
-fn a_mirrored_scan_is_never_reached_by_a_reflection() {
-    // A crate on the left side makes left and right differ.
+fn a_mirrored_scan_is_never_fitted_by_a_reflection() {
+    // A box on the left side makes left and right differ.
     let mut shape = hatchback();
     shape.push([DVec3::new(-1.8, 0.9, -0.4), DVec3::new(-0.2, 1.5, 0.5)]);
     let truth = gauge(3);
@@ -97,7 +98,7 @@ fn a_mirrored_scan_is_never_reached_by_a_reflection() {
     }
 }
 
-/// A hatchback with rows of bars on its roof, a hand apart: a ladder truck's superstructure.
+/// A hatchback with rows of bars on its roof, 10 cm apart, like the superstructure of a ladder truck.
 fn with_open_structure() -> vg_testing::boxes::Shape {
     let mut shape = hatchback();
     for k in 0..26 {
@@ -110,19 +111,19 @@ fn with_open_structure() -> vg_testing::boxes::Shape {
 }
 
 #[test]
-fn a_vehicle_with_open_structures_is_judged_by_what_can_be_compared() {
+fn a_vehicle_with_open_structures_is_judged_by_edges_against_open_background() {
     let (shape, truth) = (with_open_structure(), gauge(5));
     let all = views(&shape, 12, &truth);
     let found = to_scan(&all, &[], &cloud(&scan(&shape, 20_000, 5)), Heading::Auto).unwrap();
-    // Bars that neighbouring bars are taken for leave more than of a closed vehicle.
+    // Confusing a bar with its neighbour leaves a larger residual than a closed vehicle has.
     let (scale, angle, position) = errors(&found.vehicle_from_world, &truth);
     assert!(scale.abs() <= 0.01 && angle <= 0.5 && position <= 0.03, "{scale} {angle} {position}");
-    // By the mean alone it would be refused: 5 pixels of a picture 512 wide.
+    // The mean alone exceeds the limit, 5 pixels of a picture 512 wide.
     assert!(found.residual_px > 5.0 * 320.0 / 512.0, "{found:?}");
 }
 
 #[test]
-fn what_cannot_be_aligned_is_refused_with_the_reason() {
+fn impossible_alignments_are_refused_with_the_reason() {
     let (shape, truth) = (hatchback(), gauge(4));
     let all = views(&shape, 8, &truth);
     let points = scan(&shape, 8_000, 4);
@@ -167,19 +168,19 @@ fn a_box_on_the_ground_gives_the_frame_once_the_front_is_known() {
 }
 
 #[test]
-fn a_cabin_a_little_off_the_middle_tells_front_from_back() {
+fn a_cabin_slightly_off_the_middle_distinguishes_front_from_back() {
     let (shape, truth) = (car([-1.5, 0.9]), gauge(6));
     let points = cloud(&scan(&shape, 12_000, 6));
     let found = to_scan(&views(&shape, 12, &truth), &[], &points, Heading::Auto).unwrap();
     assert_close("off the middle", &found.vehicle_from_world, &truth);
 }
 
-/// The ray-traced vehicles with true poses, or `None`, which is printed.
+/// The ray-traced vehicles with true poses. Prints a line if there are none.
 fn carset() -> Option<PathBuf> {
     let folder = std::env::var_os("VG_CARSET").map(PathBuf::from);
     if folder.is_none() {
-        // Data, not a tool: VG_NO_SKIP does not ask for it.
-        say("skipped: no ray-traced vehicles with true poses (VG_CARSET says where they are)");
+        // These are data, not a tool, so VG_NO_SKIP does not require them.
+        say("skipped: no ray-traced vehicles with true poses (VG_CARSET is their folder)");
     }
     folder
 }
@@ -239,7 +240,7 @@ fn ten_vehicles_are_aligned_within_half_a_percent_half_a_degree_and_three_centim
         assert_close(&name, &found.vehicle_from_world, &truth);
         assert!(found.confidence > 0.5, "{name}: {found:?}");
 
-        // With a box alone, once somebody said which way the view that would be asked for looks.
+        // With a box alone, after giving the heading of the first view.
         let vehicle = json(&folder.join("vehicle.json"));
         let size = ["length_m", "width_m", "height_m"].map(|key| vehicle[key].as_f64().unwrap());
         let fits = [Heading::Forward, Heading::Backward].map(|heading| {

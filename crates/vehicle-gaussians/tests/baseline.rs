@@ -1,4 +1,4 @@
-//! What is promised of the baseline, on an ellipsoid of which everything is known.
+//! Promises of the baseline, on an ellipsoid with known geometry.
 
 use std::ops::ControlFlow;
 use vg::pipeline::{Options, PriorChoice, Reconstruction, reconstruct};
@@ -25,7 +25,7 @@ fn refusal(scene: &Scene, options: &Options) -> String {
     reconstruct(scene, options, &mut |_| ControlFlow::Continue(())).unwrap_err().to_string()
 }
 
-/// The scene with `n` points of the vehicle's surface, and one that is nowhere.
+/// The scene with `n` points of the vehicle's surface, and one far outside.
 fn with_cloud(mut scene: Scene, n: usize) -> Scene {
     let point = |i: usize| {
         // A spiral from pole to pole.
@@ -69,7 +69,7 @@ fn any_number_of_threads_gives_the_same_bytes_and_another_seed_does_not() {
 }
 
 #[test]
-fn seconds_are_resolved_to_steps_that_can_be_replayed() {
+fn seconds_become_a_number_of_steps_that_can_be_repeated() {
     let scene = right_side(48, 36);
     let made = run(&scene, &options(BaselineOptions { amount: Amount::Seconds(0.6), ..steps(0) }));
     let n = made.report.refinement.as_ref().unwrap().iterations;
@@ -80,7 +80,7 @@ fn seconds_are_resolved_to_steps_that_can_be_replayed() {
 #[test]
 fn there_are_never_more_gaussians_than_allowed() {
     let scene = right_side(48, 36);
-    // Everything that is seen wants company, and nothing is transparent.
+    // Every visible Gaussian is to be densified, and none is transparent.
     let densify = Densify { gradient: 0.0, least_opacity: 0.0, most: 1_600, ..Densify::default() };
     let made = run(&scene, &options(BaselineOptions { densify: Some(densify), ..steps(80) }));
     let done = made.report.refinement.unwrap().densified.unwrap();
@@ -91,7 +91,7 @@ fn there_are_never_more_gaussians_than_allowed() {
 }
 
 #[test]
-fn a_cloud_is_what_it_starts_from() {
+fn it_starts_from_a_given_cloud() {
     let scene = with_cloud(right_side(64, 48), 2_000);
     let made = run(&scene, &options(steps(0)));
     assert_eq!(made.gaussians.len(), 1_500);
@@ -114,7 +114,7 @@ fn one_view_is_enough() {
 }
 
 #[test]
-fn what_a_baseline_has_not_is_refused_by_its_name() {
+fn options_that_a_baseline_lacks_are_refused_by_name() {
     let scene = right_side(48, 36);
     let plain = options(steps(1));
     let bad: [(Options, &str); 10] = [

@@ -1,5 +1,5 @@
-//! The self-calibration: known errors of the plane and of cameras are found, exact cameras stay as they are, and
-//! what cannot be corrected is refused.
+//! Self-calibration: known errors of the plane and of cameras are corrected, exact cameras are unchanged, and excessive
+//! errors are refused.
 
 use glam::{DMat3, DQuat, DVec3};
 use std::ops::ControlFlow;
@@ -24,7 +24,7 @@ fn calibration(made: &Reconstruction) -> &Calibration {
     made.report.calibration.as_ref().unwrap()
 }
 
-/// All cameras of a scene, as a detector sees them that is off by this.
+/// All cameras of a scene, moved by the error of a detector.
 fn plane_moved(mut scene: Scene, yaw_degrees: f64, lateral_m: f64) -> Scene {
     let rotation = DMat3::from_rotation_z(yaw_degrees.to_radians());
     let moved = Pose { rotation, translation: DVec3::new(0.0, lateral_m, 0.0) };
@@ -34,7 +34,7 @@ fn plane_moved(mut scene: Scene, yaw_degrees: f64, lateral_m: f64) -> Scene {
     scene
 }
 
-/// Every camera on its own: 0.3 degrees and 3 cm about every axis, one sigma.
+/// Every camera independently: 0.3 degrees and 3 cm about every axis, one sigma.
 fn jittered(mut scene: Scene, seed: u64) -> Scene {
     let mut random = vg_testing::Random::new(seed);
     for view in &mut scene.views {
@@ -63,12 +63,12 @@ fn a_plane_two_degrees_and_five_centimetres_off_is_found_and_the_unseen_side_gai
         let made = both(&input);
         let found = calibration(&made[1]);
         assert_eq!(found.verdict, Verdict::Accepted, "{found:?}");
-        // What was done to the cameras is undone; half a degree moves the bumpers by 2 cm, two pixels.
+        // The change of the cameras is undone; half a degree moves the bumpers by 2 cm, two pixels.
         assert!((found.yaw_degrees + yaw).abs() < 0.5, "{found:?}");
         assert!((found.lateral_m + lateral).abs() < 0.025, "{found:?}");
         assert!(found.coverage_after > found.coverage_before && found.coverage_after > 0.995, "{found:?}");
         assert!(found.edge_error_after_px < 0.5 * found.edge_error_before_px, "{found:?}");
-        // Drawn by the caller's cameras: the model is in the caller's frame.
+        // Drawn with the caller's cameras: the model is in the caller's frame.
         let [off, auto] = made.map(|m| errors(&m, &unseen).unwrap());
         assert!(auto.psnr_db > off.psnr_db + 0.3, "{} {}", off.psnr_db, auto.psnr_db);
         assert!(auto.silhouette_iou > off.silhouette_iou + 0.005);
@@ -76,7 +76,7 @@ fn a_plane_two_degrees_and_five_centimetres_off_is_found_and_the_unseen_side_gai
 }
 
 #[test]
-fn cameras_that_are_off_one_by_one_fill_the_masks_again() {
+fn corrected_cameras_that_were_off_independently_fill_the_masks() {
     let unseen = open(&UNSEEN, false).unwrap();
     for seed in [1, 2] {
         let made = both(&jittered(open(&INPUTS, false).unwrap(), seed));
@@ -90,7 +90,7 @@ fn cameras_that_are_off_one_by_one_fill_the_masks_again() {
 }
 
 #[test]
-fn exact_cameras_are_left_alone_and_the_model_is_that_without() {
+fn exact_cameras_are_unchanged_and_give_the_model_of_calibrate_off() {
     let [off, auto] = both(&open(&INPUTS, false).unwrap());
     let found = calibration(&auto);
     assert_eq!(found.verdict, Verdict::NotNeeded, "{found:?}");
@@ -101,7 +101,7 @@ fn exact_cameras_are_left_alone_and_the_model_is_that_without() {
 }
 
 #[test]
-fn half_a_mask_behind_an_occluder_is_recognised_and_the_plane_is_found_nevertheless() {
+fn half_a_mask_behind_an_occluder_is_recognised_and_the_plane_is_still_found() {
     for moved in [false, true] {
         let (yaw, lateral) = if moved { (2.0, 0.05) } else { (0.0, 0.0) };
         let mut input = plane_moved(open(&INPUTS, false).unwrap(), yaw, lateral);
@@ -153,7 +153,7 @@ fn the_point_cloud_lies_on_the_rays_of_the_corrected_cameras_in_the_callers_fram
 }
 
 #[test]
-fn one_silhouette_cannot_tell_and_says_so() {
+fn one_silhouette_determines_no_plane_and_the_report_has_the_reason() {
     let scene = open(&INPUTS[..1], false).unwrap();
     let [off, auto] = both(&scene);
     assert!(auto.report.calibration.is_none());
@@ -163,7 +163,7 @@ fn one_silhouette_cannot_tell_and_says_so() {
 }
 
 #[test]
-fn views_without_masks_are_calibrated_by_the_outlines_of_their_depth() {
+fn views_without_masks_are_calibrated_with_the_outlines_of_their_depth() {
     let mut scene = open(&INPUTS, true).unwrap();
     scene.views.iter_mut().for_each(|v| v.mask = None);
     let made = run(&scene, &Options { prior: PriorChoice::Given, ..options(Calibrate::Auto) }).unwrap();
@@ -177,7 +177,7 @@ fn views_without_masks_are_calibrated_by_the_outlines_of_their_depth() {
 }
 
 #[test]
-fn more_than_a_detectors_error_is_refused_and_reported() {
+fn errors_larger_than_a_detectors_are_refused_and_reported() {
     let input = plane_moved(open(&INPUTS, false).unwrap(), 9.0, 0.0);
     let [off, auto] = both(&input);
     let found = calibration(&auto);
@@ -189,7 +189,7 @@ fn more_than_a_detectors_error_is_refused_and_reported() {
 }
 
 #[test]
-fn silly_masks_give_finite_numbers_or_the_priors_own_error() {
+fn degenerate_masks_give_finite_numbers_or_the_error_of_the_prior() {
     let base = || Scene {
         views: [-40.0, -140.0].map(|a| view(&format!("{a}"), camera(a, 6.5, 64, 48))).to_vec(),
         ..Scene::default()

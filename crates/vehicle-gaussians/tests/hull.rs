@@ -1,4 +1,4 @@
-//! The hull prior on a vehicle whose shape is known.
+//! The hull prior on a vehicle with known shape.
 
 use std::ops::ControlFlow;
 use vg::pipeline::{Options, PriorChoice, Reconstruction, reconstruct};
@@ -38,14 +38,14 @@ fn every_mask_pixel_has_depth_near_the_surface() {
         let excess = excess(&scene, &geometry, i);
         let mean = excess.iter().sum::<f32>() / excess.len() as f32;
         assert!((-0.2..0.05).contains(&mean), "view {i}: mean {mean}");
-        // The surface is drawn in by 5 cm, which shows as more where it is seen at a slant.
+        // The surface is drawn in by 5 cm, which is more along slanted rays.
         let behind = excess.iter().filter(|e| **e > 0.2).count() as f32 / excess.len() as f32;
         assert!(behind < 0.05, "view {i}: {behind} far behind the surface");
     }
 }
 
 #[test]
-fn the_estimated_box_holds_the_vehicle_and_little_more() {
+fn the_estimated_box_contains_the_vehicle_and_little_more() {
     let scene = without_depth(right_side(320, 240));
     let size = estimate(&scene, None).working_box.unwrap().size();
     for (k, size) in size.into_iter().enumerate() {
@@ -77,7 +77,7 @@ fn true_size() -> [f64; 3] {
 }
 
 #[test]
-fn a_true_size_is_placed_by_the_silhouettes_and_takes_nothing_of_the_vehicle() {
+fn a_true_size_is_placed_by_the_silhouettes_and_cuts_nothing_off() {
     let all = right_side(320, 240);
     for kept in [vec![0], vec![1], vec![1, 2], vec![0, 3], vec![0, 1, 2, 3]] {
         let views: Vec<View> = kept.iter().map(|&i| all.views[i].clone()).collect();
@@ -94,7 +94,7 @@ fn a_true_size_is_placed_by_the_silhouettes_and_takes_nothing_of_the_vehicle() {
 }
 
 #[test]
-fn a_size_of_another_vehicle_is_refused_and_one_that_is_a_little_off_is_told() {
+fn a_size_of_another_vehicle_is_refused_and_one_slightly_off_gives_a_warning() {
     let scene = without_depth(right_side(320, 240));
     let made = |size: [f64; 3]| {
         let options = Options { prior: PriorChoice::Hull, vehicle_size: Some(size), ..Options::default() };
@@ -112,7 +112,7 @@ fn a_size_of_another_vehicle_is_refused_and_one_that_is_a_little_off_is_told() {
 }
 
 #[test]
-fn a_box_that_stands_elsewhere_brings_its_plane_along_and_the_result_stays_in_the_cameras_frame() {
+fn a_box_away_from_the_origin_defines_the_plane_and_the_result_stays_in_the_cameras_frame() {
     let scene = without_depth(right_side(160, 120));
     let place = Place { center: [30.0, -12.0, 4.0], yaw: 2.1 };
     let mut elsewhere = scene.clone();
@@ -176,7 +176,7 @@ fn a_mask_cut_by_the_border_carves_nothing_beyond_it() {
     for k in 0..3 {
         assert!(cut_box.size()[k] > whole.size()[k] - 0.1, "axis {k} lost: {cut_box:?} {whole:?}");
     }
-    // The other views still find a surface under every pixel, about where it was.
+    // With the other views there is a surface under every pixel, about where it was.
     for i in [0, 2, 3] {
         let mask = scene.views[i].mask.as_ref().unwrap();
         let filled = mask
@@ -196,7 +196,7 @@ fn one_side_view_alone_gets_a_plausible_width() {
 }
 
 #[test]
-fn silhouettes_that_meet_nowhere_are_an_error_that_says_what_to_check() {
+fn silhouettes_that_meet_nowhere_are_an_error_with_what_to_check() {
     let mut scene = without_depth(right_side(160, 120));
     // The third camera looks away from the vehicle.
     scene.views[2].camera.vehicle_from_camera.translation.x += 40.0;
@@ -206,7 +206,7 @@ fn silhouettes_that_meet_nowhere_are_an_error_that_says_what_to_check() {
 }
 
 #[test]
-fn measured_points_correct_the_hull_and_those_elsewhere_are_counted() {
+fn measured_points_correct_the_hull_and_points_outside_it_are_counted() {
     let scene = right_side(320, 240);
     let error = |geometry: &Geometry| -> f32 {
         let all: Vec<f32> = (0..4).flat_map(|i| excess(&scene, geometry, i)).map(f32::abs).collect();
@@ -239,7 +239,7 @@ fn measured_points_correct_the_hull_and_those_elsewhere_are_counted() {
     let report = run(&with, None).report;
     assert_eq!(report.cloud, Some(fit));
     assert!(report.left_out.iter().any(|l| l.what == "points" && l.count == fit.outside));
-    // Given depth needs no points, and says so.
+    // Given depth ignores points, and the report has an entry for that.
     let given = Scene { cloud: with.cloud, ..scene.clone() };
     let made = reconstruct(&given, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap();
     assert!(made.report.left_out.iter().any(|l| l.what == "points" && l.count == 430));

@@ -1,4 +1,4 @@
-//! Models of other programs, in the layouts that they write, with known answers.
+//! Models of other programs, in the layouts that these write, with known answers.
 
 use glam::{DMat3, DQuat, DVec3};
 use std::io::Write;
@@ -11,7 +11,7 @@ use vg::scene::Cloud;
 use vg::{Gaussians, Result, Scene, View};
 use vg_testing::{Random, sample};
 
-/// A PLY as both programs write it: normals of zero, one colour, logit opacity, logarithmic scales.
+/// Writes a PLY as both programs do: normals of zero, one colour, logit opacity, logarithmic scales.
 fn write(path: &Path, g: &Gaussians) {
     const FIELDS: [&str; 17] = [
         "x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1",
@@ -49,9 +49,9 @@ fn turn(degrees: [f64; 3]) -> DMat3 {
     DMat3::from_quat(DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x))
 }
 
-/// What Depth Anything 3 would say of a view: a Gaussian for each pixel of a coarse grid that the photograph's depth
-/// knows, and a wall 30 m away for the others. The numbers of those on the vehicle.
-fn of_view(view: &View) -> (Gaussians, usize) {
+/// Output of Depth Anything 3 for a view: a Gaussian for each pixel of a coarse grid with depth, and a wall 30 m away
+/// for the others. Also returns the number of those on the vehicle.
+fn gaussians_from_view(view: &View) -> (Gaussians, usize) {
     let (mut g, mut on_vehicle) = (Gaussians::with_capacity(0, 0), 0);
     let depth = view.depth.as_ref().unwrap();
     for v in (0..view.camera.height).step_by(3) {
@@ -79,7 +79,7 @@ fn of_view(view: &View) -> (Gaussians, usize) {
 fn a_ply_for_each_view_is_cut_by_the_masks_and_moved_by_the_cameras() {
     let scene = sample::open(&sample::INPUTS, true).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    // The frame of the network's first camera, in a unit of its own.
+    // The frame of the network's first camera, in another unit.
     let to_vehicle = Similarity {
         scale: 3.7,
         rotation: turn([100.0, -4.0, 31.0]),
@@ -88,7 +88,7 @@ fn a_ply_for_each_view_is_cut_by_the_masks_and_moved_by_the_cameras() {
     let from_vehicle = to_vehicle.inverse();
     let (mut parts, mut expected) = (Vec::new(), 0);
     for view in &scene.views {
-        let (g, on_vehicle) = of_view(view);
+        let (g, on_vehicle) = gaussians_from_view(view);
         let path = folder.path().join(&view.name).with_extension("ply");
         write(&path, &g.transformed(&from_vehicle).unwrap());
         parts.push(read(&path));
@@ -101,10 +101,13 @@ fn a_ply_for_each_view_is_cut_by_the_masks_and_moved_by_the_cameras() {
         .collect();
     let merged = merge_views(&parts, &scene.views, Some(&centers)).unwrap();
     assert!(expected > 5000 && merged.len() == expected, "{} of {expected}", merged.len());
-    // The vehicle's Gaussians are where its depth is.
-    let exact =
-        merge_views(&scene.views.iter().map(|v| of_view(v).0).collect::<Vec<_>>(), &scene.views, None)
-            .unwrap();
+    // The vehicle's Gaussians lie at its depth.
+    let exact = merge_views(
+        &scene.views.iter().map(|v| gaussians_from_view(v).0).collect::<Vec<_>>(),
+        &scene.views,
+        None,
+    )
+    .unwrap();
     assert_eq!(exact.len(), expected);
     for (a, b) in merged.means().iter().zip(exact.means()) {
         assert!((0..3).all(|k| (a[k] - b[k]).abs() < 1e-4), "{a:?} {b:?}");
@@ -118,7 +121,7 @@ fn a_ply_for_each_view_is_cut_by_the_masks_and_moved_by_the_cameras() {
 }
 
 #[test]
-fn an_object_of_any_size_and_heading_is_put_on_the_scan() {
+fn an_object_of_any_size_and_heading_is_fitted_to_the_scan() {
     let (scene, made) = model().unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("object.ply");
@@ -163,7 +166,7 @@ fn an_object_of_any_size_and_heading_is_put_on_the_scan() {
 }
 
 #[test]
-fn what_makes_no_sense_is_named() {
+fn invalid_imports_are_errors_that_name_the_cause() {
     let (scene, made) = model().unwrap();
     let message = |result: Result<Gaussians>| result.unwrap_err().to_string();
     let two = [made.clone(), made.clone()];
@@ -184,7 +187,7 @@ fn what_makes_no_sense_is_named() {
     let error = place_object(&made, Up::Z, &few, &scene.views).unwrap_err().to_string();
     assert!(error.contains("scan: 5 points") || error.contains("scan"), "{error}");
     let line: Vec<[f32; 3]> = (0..500).map(|i| [i as f32 * 0.01, 0.0, 0.0]).collect();
-    // A line has no turn about itself: an error or a finite place, never a panic.
+    // A rotation about a line is undetermined: an error or a finite result, never a panic.
     if let Ok(placed) = place_object(&made, Up::Z, &Cloud::new(line).unwrap(), &scene.views) {
         assert!(placed.gaussians.means().iter().flatten().all(|v| v.is_finite()));
     }

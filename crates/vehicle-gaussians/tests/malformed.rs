@@ -1,5 +1,5 @@
 //! Malformed files and arguments: each is refused by an error that names the file and field, or the argument.
-//! One row a defect: what is broken, what the error must say, and the call.
+//! One row per defect: its name, the words in the error, and the call.
 
 use glam::{DMat3, DVec3};
 use std::fs;
@@ -13,7 +13,7 @@ use vg::scene::mask::{Label, Mask};
 use vg::scene::{DepthMap, PixelFormat, RgbImage, Scene, View};
 use vg::{Gaussians, Result};
 
-/// Runs rows and collects what went wrong with them.
+/// Runs rows and collects failures.
 #[derive(Default)]
 struct Table {
     rows: usize,
@@ -21,17 +21,17 @@ struct Table {
 }
 
 impl Table {
-    /// `call` must fail with an error that contains all of `says`, and must not panic.
-    fn row<T>(&mut self, defect: &str, says: &[&str], call: impl FnOnce() -> Result<T>) {
+    /// `call` must fail with an error that contains all of `words`, and must not panic.
+    fn row<T>(&mut self, defect: &str, words: &[&str], call: impl FnOnce() -> Result<T>) {
         self.rows += 1;
         let wrong = match catch_unwind(AssertUnwindSafe(call)) {
             Err(_) => "panicked".to_owned(),
             Ok(Ok(_)) => "was accepted".to_owned(),
             Ok(Err(e)) => {
                 let text = e.to_string();
-                match says.iter().find(|s| !text.contains(**s)) {
+                match words.iter().find(|s| !text.contains(**s)) {
                     None => return,
-                    Some(missing) => format!("does not say {missing:?}: {text}"),
+                    Some(missing) => format!("the error lacks {missing:?}: {text}"),
                 }
             }
         };
@@ -55,9 +55,9 @@ fn document(top: &str, frame: &str) -> String {
 #[test]
 fn transforms() {
     let mut table = Table::default();
-    let mut row = |defect: &str, says: &[&str], text: &str| {
-        let says: Vec<&str> = [&["t.json: "], says].concat();
-        table.row(defect, &says, || transforms::parse(text.as_bytes(), Path::new("t.json")));
+    let mut row = |defect: &str, words: &[&str], text: &str| {
+        let words: Vec<&str> = [&["t.json: "], words].concat();
+        table.row(defect, &words, || transforms::parse(text.as_bytes(), Path::new("t.json")));
     };
     let good = document(r#""fl_x": 100,"#, "");
     transforms::parse(good.as_bytes(), Path::new("t.json")).unwrap();
@@ -97,7 +97,7 @@ fn transforms() {
         &["frames[0].depth_file_path"],
         &document(r#""fl_x": 1,"#, r#""depth_file_path": "/d.png","#),
     );
-    for (defect, matrix, says) in [
+    for (defect, matrix, words) in [
         ("a matrix of three columns", "[[1,0,0],[0,1,0],[0,0,1]]", "transform_matrix[0]"),
         ("a matrix of two rows", "[[1,0,0,0],[0,1,0,0]]", "transform_matrix"),
         ("a matrix of five rows", "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1],[0,0,0,1]]", "5"),
@@ -112,9 +112,9 @@ fn transforms() {
     ] {
         let text =
             format!(r#"{{"fl_x": 1, "frames": [{{"file_path": "a.png", "transform_matrix": {matrix}}}]}}"#);
-        row(defect, &[says], &text);
+        row(defect, &[words], &text);
     }
-    for (defect, top, frame, says) in [
+    for (defect, top, frame, words) in [
         ("no focal length", "", "", "frames[0].fl_x"),
         ("a focal length of zero", r#""fl_x": 0,"#, "", "frames[0].focal length"),
         ("a negative focal length", "", r#""fl_x": -5,"#, "frames[0].focal length"),
@@ -159,7 +159,7 @@ fn transforms() {
             "applied_transform",
         ),
     ] {
-        row(defect, &[says], &document(top, frame));
+        row(defect, &[words], &document(top, frame));
     }
     table.row("a file name that is no UTF-8", &["t.json"], || {
         let bytes = good.replace("a.png", "a.p\u{1}g").into_bytes();
@@ -204,9 +204,9 @@ const STILL: [f64; 7] = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
 #[test]
 fn colmap_binary() {
     let mut table = Table::default();
-    let mut cameras = |defect: &str, says: &[&str], bytes: Bytes| {
-        let says: Vec<&str> = [&["cameras.bin: "], says].concat();
-        table.row(defect, &says, || colmap::cameras_from_binary(&bytes.0, Path::new("cameras.bin")));
+    let mut cameras = |defect: &str, words: &[&str], bytes: Bytes| {
+        let words: Vec<&str> = [&["cameras.bin: "], words].concat();
+        table.row(defect, &words, || colmap::cameras_from_binary(&bytes.0, Path::new("cameras.bin")));
     };
     let b = Bytes::default;
     let one = |w, h, params: &[f64]| b().u64(1).camera(3, 1, w, h, params);
@@ -225,8 +225,8 @@ fn colmap_binary() {
     for (id, name) in
         [(7, "FOV"), (8, "SIMPLE_RADIAL_FISHEYE"), (10, "THIN_PRISM_FISHEYE"), (17, "EQUIRECTANGULAR")]
     {
-        let says = format!("camera 3.model: {name};");
-        cameras(name, &[&says, "image_undistorter"], b().u64(1).camera(3, id, 64, 48, &PINHOLE));
+        let words = format!("camera 3.model: {name};");
+        cameras(name, &[&words, "image_undistorter"], b().u64(1).camera(3, id, 64, 48, &PINHOLE));
     }
     cameras("no width", &["camera 3.size"], one(0, 48, &PINHOLE));
     cameras("a height of 2^40", &["camera 3.size"], one(64, 1 << 40, &PINHOLE));
@@ -243,9 +243,9 @@ fn colmap_binary() {
         b().u64(2).camera(3, 1, 64, 48, &PINHOLE).camera(3, 1, 64, 48, &PINHOLE)
     });
 
-    let mut images = |defect: &str, says: &[&str], bytes: Bytes| {
-        let says: Vec<&str> = [&["images.bin: "], says].concat();
-        table.row(defect, &says, || {
+    let mut images = |defect: &str, words: &[&str], bytes: Bytes| {
+        let words: Vec<&str> = [&["images.bin: "], words].concat();
+        table.row(defect, &words, || {
             let cameras = colmap::cameras_from_binary(&good.0, Path::new("cameras.bin"))?;
             let path = Path::new("images.bin");
             colmap::Model::new(cameras, colmap::images_from_binary(&bytes.0, path)?, path)
@@ -288,9 +288,9 @@ fn colmap_binary() {
         b().u64(2).image(9, &STILL, 3, b"a.png", 0).image(8, &STILL, 3, b"./a.png", 0)
     });
 
-    let mut points = |defect: &str, says: &[&str], bytes: Bytes| {
-        let says: Vec<&str> = [&["points3D.bin: "], says].concat();
-        table.row(defect, &says, || colmap::points_from_binary(&bytes.0, Path::new("points3D.bin")));
+    let mut points = |defect: &str, words: &[&str], bytes: Bytes| {
+        let words: Vec<&str> = [&["points3D.bin: "], words].concat();
+        table.row(defect, &words, || colmap::points_from_binary(&bytes.0, Path::new("points3D.bin")));
     };
     let point = |xyz: &[f64; 3], track| b().u64(1).u64(5).f64s(xyz).text(&[1, 2, 3]).f64s(&[0.5]).u64(track);
     points("2^50 points", &["count"], b().u64(1 << 50));
@@ -302,8 +302,8 @@ fn colmap_binary() {
 #[test]
 fn colmap_text() {
     let mut table = Table::default();
-    let mut cameras = |defect: &str, says: &str, text: &str| {
-        table.row(defect, &["cameras.txt: ", says], || {
+    let mut cameras = |defect: &str, words: &str, text: &str| {
+        table.row(defect, &["cameras.txt: ", words], || {
             colmap::cameras_from_text(text.as_bytes(), Path::new("cameras.txt"))
         });
     };
@@ -317,9 +317,10 @@ fn colmap_text() {
     cameras("a parameter that is a word", "line 1.PARAMS", "3 PINHOLE 64 48 1 1 x 1");
     cameras("a NaN parameter", "camera 3.focal length", "3 PINHOLE 64 48 nan 1 1 1");
     cameras("one id twice", "camera 3.id", "3 PINHOLE 64 48 1 1 1 1\n3 PINHOLE 64 48 1 1 1 1");
-    let mut images = |defect: &str, says: &str, text: &[u8]| {
-        table
-            .row(defect, &["images.txt: ", says], || colmap::images_from_text(text, Path::new("images.txt")));
+    let mut images = |defect: &str, words: &str, text: &[u8]| {
+        table.row(defect, &["images.txt: ", words], || {
+            colmap::images_from_text(text, Path::new("images.txt"))
+        });
     };
     images("a pose cut off", "line 1.TX: missing", b"9 1 0 0 0");
     images("a quaternion that is a word", "line 1.QY", b"9 1 0 i 0 0 0 0 3 a.png\n\n");
@@ -366,7 +367,7 @@ fn ply_files() {
     let mut table = Table::default();
     let read = |bytes: &[u8]| ply::read_from(bytes, bytes.len() as u64, Path::new("m.ply"));
     read(&ply_file(|h| h, None)).unwrap();
-    for (defect, says, from, to) in [
+    for (defect, words, from, to) in [
         ("not PLY", "magic", "ply\n", "plx\n"),
         ("ASCII", "format: \"format ascii 1.0\"", "binary_little_endian", "ascii"),
         ("big-endian", "binary_big_endian", "little", "big"),
@@ -393,7 +394,7 @@ fn ply_files() {
         let bytes = ply_file(|h| h.replacen(from, to, 1), None);
         let bytes = [bytes, vec![0; 4]].concat();
         let bytes = if defect == "more rows than bytes" { &bytes[..bytes.len() - 4] } else { &bytes[..] };
-        table.row(defect, &["m.ply: ", says], || read(bytes));
+        table.row(defect, &["m.ply: ", words], || read(bytes));
     }
     for (name, value) in [
         ("x", f32::NAN),
@@ -417,7 +418,7 @@ fn ply_files() {
         let comments = b"comment and so on\n".repeat(1 << 16);
         read(&[&b"ply\nformat binary_little_endian 1.0\n"[..], &comments].concat())
     });
-    table.row("a file shorter than it says", &["m.ply: vertex 0"], || {
+    table.row("a file shorter than its header claims", &["m.ply: vertex 0"], || {
         let bytes = ply_file(|h| h, None);
         ply::read_from(&bytes[..bytes.len() - 1], bytes.len() as u64, Path::new("m.ply"))
     });
@@ -452,7 +453,7 @@ fn pictures_and_depth() {
     table.row("a PNG of its magic alone", &["a.png: picture"], || decode(&png[..8]));
     let mut huge = png.clone();
     huge[16..20].copy_from_slice(&60000u32.to_be_bytes());
-    // The header's checksum no longer fits; either complaint will do, allocating 60000 columns will not.
+    // The checksum of the header is wrong as well; either error is correct, but 60000 columns must not be allocated.
     table.row("a PNG 60000 wide", &["a.png: "], || decode(&huge));
     table.row("a JPEG cut off", &["a.png: picture: ends before"], || {
         decode(&[0xff, 0xd8, 0xff, 0xda, 0, 2, 1, 2])
@@ -468,8 +469,8 @@ fn pictures_and_depth() {
         });
     }
     table.row("depth in a .tiff", &["d.tiff: extension"], || depth::read(Path::new("d.tiff"), 1.0));
-    let mut pfm = |defect: &str, says: &str, bytes: &[u8]| {
-        table.row(defect, &["d.pfm: ", says], || {
+    let mut pfm = |defect: &str, words: &str, bytes: &[u8]| {
+        table.row(defect, &["d.pfm: ", words], || {
             depth::decode(DepthFormat::Pfm, bytes, Path::new("d.pfm"), 1.0)
         });
     };
@@ -480,12 +481,12 @@ fn pictures_and_depth() {
     pfm("a size of NaN", "size", b"Pf\nnan 1\n-1\n\0\0\0\0");
     pfm("a scale of 0", "scale", b"Pf\n1 1\n0\n\0\0\0\0");
     pfm("rows cut off", "data: 3 bytes", b"Pf\n1 1\n-1\n\0\0\0");
-    let mut npy = |defect: &str, says: &str, header: &str, data: &[u8]| {
+    let mut npy = |defect: &str, words: &str, header: &str, data: &[u8]| {
         let mut bytes = b"\x93NUMPY\x01\0".to_vec();
         bytes.extend((header.len() as u16).to_le_bytes());
         bytes.extend(header.as_bytes());
         bytes.extend(data);
-        table.row(defect, &["d.npy: ", says], || {
+        table.row(defect, &["d.npy: ", words], || {
             depth::decode(DepthFormat::Npy, &bytes, Path::new("d.npy"), 1.0)
         });
     };
@@ -589,7 +590,7 @@ fn scenes_on_disk() {
     table.row("a model without a gauge", &["vehicle_from_world", "--vehicle-from-world"], || open(root));
 
     let v = |text: &str| vehicle_frame::parse_vehicle_from_world(text.as_bytes(), Path::new("v.json"));
-    for (defect, text, says) in [
+    for (defect, text, words) in [
         ("no key", r#"{"matrix": []}"#, "vehicle_from_world: missing"),
         ("a number", "3", "not a 4x4 matrix"),
         ("three rows", "[[1,0,0,0],[0,1,0,0],[0,0,1,0]]", "not a 4x4 matrix"),
@@ -602,7 +603,7 @@ fn scenes_on_disk() {
         ("two scales", "[1,0,0,0, 0,2,0,0, 0,0,1,0, 0,0,0,1]", "|R^T R - I|"),
         ("not JSON", "1 0 0 0", "v.json: "),
     ] {
-        table.row(&format!("vehicle_from_world: {defect}"), &["v.json: ", says], || v(text));
+        table.row(&format!("vehicle_from_world: {defect}"), &["v.json: ", words], || v(text));
     }
     table.row("centres of two numbers", &["k.json: a.png"], || {
         vehicle_frame::parse_known_centers(br#"{"a.png": [1, 2]}"#, Path::new("k.json"))

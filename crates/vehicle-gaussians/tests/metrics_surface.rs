@@ -1,4 +1,4 @@
-//! Surface errors of shapes whose answers are known: a box of flat Gaussians against points scanned on it.
+//! Surface errors of shapes with known answers: a box of flat Gaussians against points scanned on it.
 
 use glam::{DQuat, DVec3};
 use vg::Gaussians;
@@ -9,13 +9,13 @@ use vg_testing::Random;
 /// The box's size, metres.
 const SIZE: DVec3 = DVec3::new(4.0, 1.8, 1.4);
 
-/// Between the Gaussians of the shell, metres: it stands out over its edges by about half of that.
+/// Spacing of the Gaussians of the shell, metres; the shell extends over its edges by about half of that.
 const STEP: f64 = 0.01;
 
-/// The sides that a scanner sees (all but the one below): the axis it is across, and where it is along it.
+/// The sides that a scanner sees (all but the bottom): their axis, and their position along it.
 const SIDES: [(usize, f64); 5] = [(0, -0.5), (0, 0.5), (1, -0.5), (1, 0.5), (2, 0.5)];
 
-/// Flat Gaussians on the shell where `keep` says so, the side below included.
+/// Flat Gaussians on the shell where `keep` is true, including the bottom.
 fn shell(keep: impl Fn(DVec3) -> bool) -> Gaussians {
     let mut gaussians = Gaussians::with_capacity(0, 0);
     for (axis, at) in SIDES.into_iter().chain([(2, -0.5)]) {
@@ -79,14 +79,14 @@ fn sizes(e: &SurfaceErrors) -> [f64; 3] {
 
 /// 40,000 points on 23 m^2 lie 12 mm from a random place of the surface, and the shell's 20 mm cells 8 mm from a point.
 #[test]
-fn a_shell_is_as_far_from_its_scan_as_the_scan_is_sparse() {
+fn the_distance_of_a_shell_from_its_scan_is_the_point_spacing() {
     let model = shell(|_| true);
     for (noise, most) in [(0.0, 0.014), (0.005, 0.017)] {
         let errors = SurfaceErrors::of(&model, &scan(40_000, noise)).unwrap();
         println!("noise {noise}: {errors:?}");
         assert!(errors.chamfer_m < most, "{errors:?}");
         assert!(errors.f_score > 0.999, "{errors:?}");
-        // A centimetre at each end: the shell stands out so far over its edges, and noise over flat sides.
+        // A centimetre at each end: the extension of the shell over its edges, and noise on flat sides.
         for (error, side) in sizes(&errors).into_iter().zip(SIZE.to_array()) {
             assert!(error.abs() < 2.5 / side, "{errors:?}");
         }
@@ -94,10 +94,10 @@ fn a_shell_is_as_far_from_its_scan_as_the_scan_is_sparse() {
 }
 
 #[test]
-fn only_what_is_seen_from_outside_and_above_is_the_surface() {
+fn only_parts_visible_from_outside_and_above_are_the_surface() {
     let mut model = shell(|_| true);
     let outside = visible_surface(&model, 0.02).unwrap();
-    // Nothing of the side below, and it is not missed in the scan either.
+    // The bottom is not part of the surface, and its absence from the scan does not count.
     let below = -0.5 * SIZE.z as f32 + 0.01;
     assert!(outside.iter().filter(|p| p[2] < below).all(|p| {
         let edge = |k: usize| (f64::from(p[k]).abs() - 0.5 * SIZE[k]).abs() < 0.03;
@@ -115,7 +115,7 @@ fn only_what_is_seen_from_outside_and_above_is_the_surface() {
 }
 
 #[test]
-fn a_larger_model_is_larger_by_so_much_percent() {
+fn a_scaled_model_has_the_scale_as_size_error() {
     let model = shell(|_| true);
     let points = scan(40_000, 0.005);
     let plain = SurfaceErrors::of(&model, &points).unwrap();
@@ -127,34 +127,34 @@ fn a_larger_model_is_larger_by_so_much_percent() {
     }
 }
 
-/// Moved across the sides by 8 cm, one side is 8 cm off and the sides along it are not; of all the surface those
-/// across are a share that is known.
+/// After a shift of 8 cm across a side, that side is 8 cm off and the sides along the shift are not; the share of the
+/// sides across in the surface is known.
 #[test]
-fn a_shifted_scan_is_as_far_as_it_was_shifted() {
+fn the_distance_of_a_shifted_scan_is_the_shift() {
     let model = shell(|_| true);
     let at = scan(40_000, 0.005);
     let errors = |shift: f64| SurfaceErrors::of(&model, &moved(&at, |p| p + shift * DVec3::Z)).unwrap();
     let (there, up) = (errors(0.0), errors(0.08));
-    // The roof, of all; and a strip of 8 cm below or above the sides, 4 cm away on average.
+    // The share of the roof; and a strip of 8 cm below or above the sides, 4 cm away on average.
     let roof = SIZE.x * SIZE.y;
     let walls = 2.0 * (SIZE.x + SIZE.y) * SIZE.z;
     let expected = (0.08 * roof + 0.04 * walls * 0.08 / SIZE.z) / (roof + walls);
     let found = up.chamfer_m - there.chamfer_m;
-    // What is 12 mm away sideways is less than 12 mm farther away when it is also 80 mm above.
+    // A point 12 mm away sideways is less than 12 mm farther away if it is also 80 mm above.
     assert!((0.6 * expected..expected).contains(&found), "{found} {expected}");
     assert!((up.precision - walls / (roof + walls)).abs() < 0.05, "{up:?}");
     assert!(up.f_score < there.f_score - 0.2);
 }
 
-/// 50 cm and farther is missing, no matter how far.
+/// Distances of 50 cm and more count as missing, whatever they are.
 #[test]
-fn a_half_that_is_missing_is_not_complete_but_accurate() {
+fn half_a_model_is_accurate_but_not_complete() {
     // Without the side below, which is seen from above where the rest is open.
     let half = shell(|p| p.y <= 0.0 && p.z > -0.5 * SIZE.z);
     let errors = SurfaceErrors::of(&half, &scan(40_000, 0.005)).unwrap();
     assert!(errors.accuracy_m < 0.016, "{errors:?}");
     assert!(errors.precision > 0.99, "{errors:?}");
-    // Of the missing half the far side is at least 50 cm away, the roof and the ends 45 cm on average or less.
+    // The far side of the missing half is at least 50 cm away, its roof and ends 45 cm on average or less.
     let side = SIZE.x * SIZE.z;
     let rest = SIZE.y * SIZE.x / 2.0 + SIZE.y * SIZE.z;
     let capped_mean = (0.5 * 0.25 + 0.4 * 0.5) / 0.9;
@@ -165,7 +165,7 @@ fn a_half_that_is_missing_is_not_complete_but_accurate() {
 }
 
 #[test]
-fn strays_of_the_scan_and_how_densely_it_is_sampled_count_nothing() {
+fn strays_and_the_density_of_the_scan_do_not_count() {
     let model = shell(|_| true);
     let clean = scan(40_000, 0.005);
     let mut random = Random::new(9);
@@ -174,7 +174,7 @@ fn strays_of_the_scan_and_how_densely_it_is_sampled_count_nothing() {
         let p = DVec3::from_array([(); 3].map(|()| random.uniform(-0.65, 0.65))) * SIZE;
         dirty.push(p.as_vec3().to_array());
     }
-    // One side thrice as densely.
+    // One side three times as densely.
     let side: Vec<_> = clean.iter().copied().filter(|p| p[1] > 0.89).collect();
     dirty.extend(moved(&side, |p| p + DVec3::new(0.007, 0.0, 0.007)));
     dirty.extend(moved(&side, |p| p - DVec3::new(0.007, 0.0, 0.007)));
@@ -197,7 +197,7 @@ fn numbers_do_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn what_cannot_be_compared_is_named() {
+fn input_that_cannot_be_compared_is_named() {
     let error =
         |model: &Gaussians, scan: &[[f32; 3]]| SurfaceErrors::of(model, scan).unwrap_err().to_string();
     let model = shell(|p| p.x > 1.9);
@@ -210,7 +210,7 @@ fn what_cannot_be_compared_is_named() {
     let options = SurfaceOptions { cell_m: f64::NAN, ..SurfaceOptions::default() };
     let error = SurfaceErrors::with(&model, &[[0.0; 3]], &options).unwrap_err().to_string();
     assert!(error.starts_with("options.cell_m: NaN"), "{error}");
-    // One point is a scan, in which nothing has a size.
+    // A single point is a scan without a size.
     let one = SurfaceErrors::of(&model, &[[2.0, 0.0, 0.0]]).unwrap();
     assert_eq!(sizes(&one), [0.0; 3]);
 }

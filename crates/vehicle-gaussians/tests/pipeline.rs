@@ -1,4 +1,4 @@
-//! The whole job: what it promises about its input, its output, its report and its callers.
+//! The whole pipeline: its promises about input, output, report and callers.
 
 use std::ops::ControlFlow;
 use vg::pipeline::{Keep, Options, PriorChoice, Reason, ReasonCode, Reconstruction, Verdict, reconstruct};
@@ -30,7 +30,7 @@ fn given_depth_is_used_when_every_view_has_it_and_the_shape_prior_otherwise() {
 }
 
 #[test]
-fn the_input_views_are_reproduced_and_the_unseen_side_is_there() {
+fn the_input_views_are_reproduced_and_the_unseen_side_is_reconstructed() {
     let scene = right_side(320, 240);
     for (prior, input_db, unseen_db) in [(PriorChoice::Given, 28.0, 26.0), (PriorChoice::Hull, 24.0, 20.0)] {
         let made = run(&scene, &Options { prior, ..Options::default() });
@@ -55,8 +55,8 @@ fn no_holes_open_at_twice_the_magnification() {
         let options = RenderOptions { background: Background::Transparent, ..RenderOptions::default() };
         let drawn = CpuRenderer::new().render(&made.gaussians, &close, &options).unwrap();
         let mask = view.mask.as_ref().unwrap();
-        // Two pixels inside the silhouette, where the rim's fall-off has ended. In the middle between four surfels
-        // a seventh of what is behind may show; a hole would show all of it.
+        // Two pixels inside the silhouette, beyond the fall-off at the rim. In the middle between four surfels a
+        // seventh of the background may show; a hole would show all of it.
         let inside = |u: u32, v: u32| {
             u >= 2
                 && v >= 2
@@ -86,14 +86,14 @@ fn one_and_two_threads_give_the_same_bytes() {
 }
 
 #[test]
-fn the_check_can_be_left_out() {
+fn the_check_can_be_switched_off() {
     let made = run(&right_side(64, 48), &Options { check: false, ..Options::default() });
     assert_eq!(made.report.input_error, None);
 }
 
 #[test]
-fn the_error_by_the_given_cameras_is_that_of_the_cameras_as_they_came() {
-    // The plane of symmetry is 2 degrees and 5 cm off: the calibration finds it, and each camera by itself.
+fn the_error_by_the_given_cameras_uses_the_cameras_of_the_input() {
+    // The plane of symmetry is off by 2 degrees and 5 cm: the calibration corrects it, and each camera separately.
     let mut scene = without_depth(right_side(160, 120));
     let turn = glam::DMat3::from_rotation_z(2f64.to_radians());
     for view in &mut scene.views {
@@ -126,7 +126,7 @@ fn the_error_by_the_given_cameras_is_that_of_the_cameras_as_they_came() {
 }
 
 #[test]
-fn cameras_that_were_not_moved_have_one_error() {
+fn uncorrected_cameras_have_a_single_error() {
     let report = run(&right_side(64, 48), &Options::default()).report;
     assert_eq!(report.input_error, report.input_error_by_given_cameras);
     assert!(report.input_views.iter().all(|view| view.errors == view.by_given_camera));
@@ -136,7 +136,7 @@ fn hull() -> Options {
     Options { prior: PriorChoice::Hull, ..Options::default() }
 }
 
-/// The verdict on the scene, which is not good, and its reason of this kind.
+/// The verdict on a scene, which is not good, and its reason with this code.
 fn reason(scene: &Scene, options: &Options, code: ReasonCode) -> (Verdict, Reason) {
     let report = run(scene, options).report;
     assert!(report.verdict > Verdict::Good && !report.verdict_reasons.is_empty());
@@ -160,7 +160,7 @@ fn shift(x: f64, y: f64, z: f64) -> vg::geometry::Pose {
 }
 
 #[test]
-fn a_scene_that_agrees_with_itself_is_good_with_depth_and_without_and_with_one_view() {
+fn a_consistent_scene_is_good_with_depth_and_without_and_with_one_view() {
     let scene = right_side(160, 120);
     let one = Scene { views: scene.views[1..2].to_vec(), ..Scene::default() };
     for (scene, options) in [
@@ -176,7 +176,7 @@ fn a_scene_that_agrees_with_itself_is_good_with_depth_and_without_and_with_one_v
 }
 
 #[test]
-fn without_the_check_nothing_is_called_good_and_a_wrong_size_is_still_bad() {
+fn without_the_check_no_verdict_is_good_and_a_wrong_size_is_still_bad() {
     let quick = Options { check: false, ..hull() };
     let mut scene = without_depth(right_side(160, 120));
     let report = run(&scene, &quick).report;
@@ -186,7 +186,7 @@ fn without_the_check_nothing_is_called_good_and_a_wrong_size_is_still_bad() {
 }
 
 #[test]
-fn the_inverted_mask_is_named_and_it_is_the_view_that_disagrees() {
+fn the_view_with_the_inverted_mask_is_named_by_both_reasons() {
     let mut scene = without_depth(right_side(160, 120));
     scene.views[1].mask = scene.views[1].mask.as_ref().map(inverted);
     let (verdict, found) = reason(&scene, &hull(), ReasonCode::MaskInverted);
@@ -220,7 +220,7 @@ fn photographs_of_the_next_frame_disagree_though_all_silhouettes_agree() {
 }
 
 #[test]
-fn sizes_that_no_road_vehicle_has_are_bad_below_and_above() {
+fn sizes_below_and_above_those_of_road_vehicles_are_bad() {
     for scale in [0.02, 0.18] {
         let mut small = without_depth(right_side(160, 120));
         small.views.iter_mut().for_each(|v| v.camera.vehicle_from_camera.translation *= scale);
@@ -228,7 +228,7 @@ fn sizes_that_no_road_vehicle_has_are_bad_below_and_above() {
         assert_eq!(verdict, Verdict::Bad);
         assert!(found.expected.contains("2.2 x 1.1 x 0.95 m"), "{found}");
     }
-    // The depth keeps up with the poses: nothing but the size is wrong.
+    // The depth is scaled with the poses: only the size is wrong.
     let mut large = right_side(160, 120);
     for view in &mut large.views {
         view.camera.vehicle_from_camera.translation *= 6.0;
@@ -241,7 +241,7 @@ fn sizes_that_no_road_vehicle_has_are_bad_below_and_above() {
 }
 
 #[test]
-fn a_frame_far_away_is_told_from_a_wrong_size() {
+fn a_frame_far_away_is_distinguished_from_a_wrong_size() {
     let mut utm = right_side(160, 120);
     move_all(&mut utm, &shift(4.5e5, 5.4e6, 0.0));
     let (verdict, found) = reason(&utm, &Options::default(), ReasonCode::FarAway);
@@ -250,7 +250,7 @@ fn a_frame_far_away_is_told_from_a_wrong_size() {
 }
 
 #[test]
-fn a_plane_beside_the_vehicle_is_a_matter_of_symmetry() {
+fn a_plane_beside_the_vehicle_has_the_reason_symmetry() {
     let mut scene = without_depth(right_side(160, 120));
     move_all(&mut scene, &shift(0.0, 1.0, 0.0));
     let (verdict, found) = reason(&scene, &hull(), ReasonCode::Symmetry);
@@ -260,7 +260,7 @@ fn a_plane_beside_the_vehicle_is_a_matter_of_symmetry() {
 }
 
 #[test]
-fn depth_of_another_unit_or_another_frame_is_told_from_the_silhouettes() {
+fn depth_of_another_unit_or_another_frame_contradicts_the_silhouettes() {
     let scene = right_side(160, 120);
     for (factor, unit) in [(1000.0, "millimetres"), (3.281, "feet")] {
         let mut wrong = scene.clone();
@@ -281,7 +281,7 @@ fn depth_of_another_unit_or_another_frame_is_told_from_the_silhouettes() {
 }
 
 #[test]
-fn a_lens_that_has_folded_before_the_vehicle_is_bad_and_named() {
+fn a_lens_that_folds_within_the_picture_of_the_vehicle_is_bad_and_named() {
     let mut scene = without_depth(right_side(160, 120));
     scene.views[2].camera.distortion =
         vg::geometry::Distortion::Brown { k: [-44.8, 0.0, 0.0, 0.0, 0.0, 0.0], p: [0.0; 2] };
@@ -290,7 +290,7 @@ fn a_lens_that_has_folded_before_the_vehicle_is_bad_and_named() {
 }
 
 #[test]
-fn every_stage_can_be_cancelled_and_says_which_it_was() {
+fn every_stage_can_be_cancelled_and_the_error_names_it() {
     let scene = without_depth(right_side(160, 120));
     let mut stages: Vec<&'static str> = Vec::new();
     let mut calls = 0;
@@ -361,10 +361,10 @@ fn the_report_is_json_with_the_promised_keys() {
     assert_eq!(report.views_used, ["-40", "-75", "-105", "-140"]);
 }
 
-// What the plan leaves out, each on a scene where it fires.
+// The omissions of the plan, each on a scene where it occurs.
 
 #[test]
-fn the_masks_tell_before_the_work_how_large_a_model_can_become() {
+fn the_size_of_a_model_is_bounded_by_its_masks_before_the_work() {
     let scene = right_side(96, 72);
     let with = |max_gaussians| run(&scene, &Options { max_gaussians, ..Options::default() });
     let whole = with(None);
@@ -375,12 +375,12 @@ fn the_masks_tell_before_the_work_how_large_a_model_can_become() {
         assert!((cap / 6..=cap).contains(&made.gaussians.len()), "{} of {cap}", made.gaussians.len());
         assert!(left_out(&made, &format!("max_gaussians, {cap}: the views are resampled to 0.")) > 0);
         assert!(left_out(&made, "averaged into fewer") > 0);
-        // The same again: what was asked for is what the settings say.
+        // Repeated with the settings of the report, which hold the requested options.
         assert_eq!(made.report.settings.resolution, 1.0);
     }
     let error = error(&scene, &Options { max_gaussians: Some(1), ..Options::default() });
     assert!(error.contains("options.max_gaussians: 1, where the masks allow for"), "{error}");
-    // More views of the same surface are no larger model.
+    // More views of the same surface do not make a larger model.
     let largest = scene.views.iter().map(|v| v.mask.as_ref().unwrap().vehicle_pixels()).max().unwrap();
     let enough = with(Some(6 * largest));
     assert!(enough.gaussians == whole.gaussians && left_out(&enough, "max_gaussians") == 0);
@@ -396,7 +396,7 @@ fn a_view_with_an_empty_mask_is_left_out() {
 }
 
 #[test]
-fn the_same_camera_twice_is_used_once() {
+fn a_duplicate_camera_is_used_once() {
     let mut scene = right_side(160, 120);
     let once = run(&scene, &Options::default());
     scene.views.push(scene.views[0].clone());
@@ -454,10 +454,10 @@ fn with_depth(
 }
 
 #[test]
-fn depth_that_a_resize_mixed_at_its_edges_makes_no_larger_vehicle() {
+fn depth_with_edges_mixed_by_a_resize_does_not_enlarge_the_vehicle() {
     let clean = right_side(160, 120);
     let expected = extent(&run(&clean, &Options::default()));
-    // Means of three by three pixels, with nothing taken for 0, and with a wall behind.
+    // Means of three by three pixels, with missing depth as 0, and with a wall behind.
     for behind in [0.0, 25.0] {
         let blurred = with_depth(&clean, 4, |at, u, v| {
             let around = (-1..=1).flat_map(|dv| (-1..=1).map(move |du| (du, dv)));
@@ -476,7 +476,7 @@ fn depth_that_a_resize_mixed_at_its_edges_makes_no_larger_vehicle() {
 }
 
 #[test]
-fn a_few_stray_pixels_and_depth_outside_the_other_masks_make_no_larger_vehicle() {
+fn stray_pixels_and_depth_outside_the_other_masks_do_not_enlarge_the_vehicle() {
     let clean = right_side(160, 120);
     let expected = extent(&run(&clean, &Options::default()));
     for (side, why) in [(1, "floating"), (2, "before or behind the vehicle"), (20, "most other views' masks")]
@@ -495,7 +495,7 @@ fn a_few_stray_pixels_and_depth_outside_the_other_masks_make_no_larger_vehicle()
 }
 
 #[test]
-fn views_from_one_direction_support_no_view_dependence() {
+fn views_from_one_direction_give_no_view_dependence() {
     let narrow = Scene {
         views: vec![view("a", camera(-90.0, 6.5, 160, 120)), view("b", camera(-93.0, 6.5, 160, 120))],
         ..Scene::default()
@@ -507,7 +507,7 @@ fn views_from_one_direction_support_no_view_dependence() {
 }
 
 #[test]
-fn where_both_sides_are_seen_nothing_is_cloned_but_what_is_missing() {
+fn with_both_sides_seen_only_missing_parts_are_cloned() {
     let around = |a: &f64| view(&format!("{a}"), camera(*a, 6.5, 160, 120));
     let scene = Scene {
         views: [-140.0, -90.0, -40.0, 40.0, 90.0, 140.0].iter().map(around).collect(),
@@ -521,14 +521,14 @@ fn where_both_sides_are_seen_nothing_is_cloned_but_what_is_missing() {
 }
 
 #[test]
-fn flipped_photographs_are_taken_for_further_views() {
+fn flipped_photographs_are_used_as_additional_views() {
     let scene = right_side(160, 120);
     let flip = Options { symmetry: SymmetryMode::Flip, points: true, ..Options::default() };
     let made = run(&scene, &flip);
     let symmetry = &made.report.symmetry;
     assert_eq!((symmetry.mode, symmetry.cloned, symmetry.replaced), (SymmetryMode::Flip, 0, 0));
     assert_eq!(made.report.views_used, ["-40", "-75", "-105", "-140"]);
-    // The cloud is what was measured; the model is whole.
+    // The cloud has only measured points; the model is complete.
     assert!(made.points.unwrap().positions.iter().all(|p| p[1] < 0.3));
     let unseen = view("unseen", camera(90.0, 6.5, 160, 120));
     let drawn =
@@ -539,13 +539,13 @@ fn flipped_photographs_are_taken_for_further_views() {
         CpuRenderer::new().render(&cloned.gaussians, &unseen.camera, &RenderOptions::default()).unwrap();
     let cloned_db = metrics::psnr(&drawn.color, &metrics::on_white(&unseen));
     assert!((db - cloned_db).abs() < 1.0, "{db:.2} dB flipped, {cloned_db:.2} cloned");
-    // Silhouettes alone, too.
+    // Also with silhouettes alone.
     assert!(run(&without_depth(scene), &flip).report.gaussians > 1000);
 }
 
-/// Mean absolute difference of colour within `band` metres of the plane and beyond it, and the least alpha within,
-/// two pixels and more inside the silhouette; at front and rear, for no view
-/// shows the middle of the roof, and above the sill.
+/// Mean absolute difference of colour within `band` metres of the plane and beyond it, and the least alpha within, two
+/// pixels and more inside the silhouette; at front and rear and above the sill, because no view shows the middle of the
+/// roof.
 fn seam(made: &Reconstruction, truth: &View, band: f32) -> (f32, f32, f32) {
     let transparent = RenderOptions { background: Background::Transparent, ..RenderOptions::default() };
     let drawn = CpuRenderer::new().render(&made.gaussians, &truth.camera, &transparent).unwrap();
@@ -568,12 +568,12 @@ fn seam(made: &Reconstruction, truth: &View, band: f32) -> (f32, f32, f32) {
             }
         }
     }
-    assert!(near.1 > 100.0 && far.1 > 100.0, "the view shows no seam");
+    assert!(near.1 > 100.0 && far.1 > 100.0, "the view does not show the seam");
     (near.0 / near.1, far.0 / far.1, least)
 }
 
 #[test]
-fn front_and_rear_neither_tear_nor_double_along_the_plane() {
+fn front_and_rear_have_no_gap_and_no_double_surface_along_the_plane() {
     let scene = right_side(320, 240);
     for (symmetry, azimuth) in
         [SymmetryMode::Auto, SymmetryMode::Always].into_iter().flat_map(|s| [(s, 8.0), (s, 172.0)])
@@ -583,7 +583,7 @@ fn front_and_rear_neither_tear_nor_double_along_the_plane() {
         let (near, far, least) = seam(&made, &truth, 0.05);
         assert!(near < 0.02 && near < far, "{symmetry:?} at {azimuth}: {near} beside {far}");
         assert!(least > 0.9, "{symmetry:?} at {azimuth}: alpha {least}");
-        // The test notices a seam that is open by the width of two surfels.
+        // The test notices a seam with a gap of two surfels.
         let mut torn = made.clone();
         let closed: Vec<bool> = torn.gaussians.means().iter().map(|m| m[1].abs() > 0.03).collect();
         torn.gaussians.retain(&closed);
@@ -593,7 +593,7 @@ fn front_and_rear_neither_tear_nor_double_along_the_plane() {
 
 #[test]
 fn clones_are_relit_unless_that_is_switched_off() {
-    // A right side that is darker than front, rear and top: the sun is on the left.
+    // A right side that is darker than front, rear and top, as with the sun on the left.
     let mut scene = right_side(160, 120);
     for view in &mut scene.views {
         let (depth, camera) = (view.depth.clone().unwrap(), view.camera);
@@ -649,14 +649,14 @@ fn no_views_or_only_empty_masks_are_errors() {
 }
 
 #[test]
-fn a_missing_mask_is_the_outline_of_depth_that_shows_the_vehicle_alone_and_else_refused() {
+fn a_missing_mask_is_replaced_by_the_outline_of_depth_of_the_vehicle_alone_or_refused() {
     let masked = right_side(64, 48);
     let mut scene = masked.clone();
     scene.views[2].mask = None;
     let made = run(&scene, &Options::default());
     assert_eq!(left_out(&made, "the outline of the view's depth"), 1);
     assert_eq!(made.gaussians, run(&masked, &Options::default()).gaussians);
-    // A wall behind the vehicle, as a depth camera sees it.
+    // A wall behind the vehicle, as in the depth of a depth camera.
     let wall = |z: &f32| if *z > 0.0 { *z } else { 20.0 };
     let depth = scene.views[2].depth.as_ref().unwrap().depth().iter().map(wall).collect();
     scene.views[2].depth = Some(DepthMap::new(64, 48, depth).unwrap());
@@ -691,7 +691,7 @@ fn one_to_sixty_four_views_give_a_vehicle() {
 }
 
 #[test]
-fn pictures_of_one_pixel_and_masks_of_one_pixel_do_not_break_it() {
+fn pictures_and_masks_of_one_pixel_give_a_result_or_an_error() {
     let tiny = Scene { views: vec![view("tiny", camera(-90.0, 6.5, 1, 1))], ..Scene::default() };
     for scene in [tiny.clone(), without_depth(tiny)] {
         match reconstruct(&scene, &Options::default(), &mut |_| ControlFlow::Continue(())) {
@@ -714,7 +714,7 @@ fn pictures_of_one_pixel_and_masks_of_one_pixel_do_not_break_it() {
 }
 
 #[test]
-fn full_masks_do_not_break_it() {
+fn full_masks_give_a_result_or_an_error() {
     let mut scene = without_depth(right_side(64, 48));
     for view in &mut scene.views {
         view.mask = Some(Mask::new(64, 48, vec![Label::Vehicle; 64 * 48]).unwrap());
@@ -726,7 +726,7 @@ fn full_masks_do_not_break_it() {
 }
 
 #[test]
-fn depth_that_is_no_measurement_is_counted_and_left_out() {
+fn invalid_depth_is_counted_and_left_out() {
     let mut scene = right_side(64, 48);
     let mut depth = scene.views[0].depth.as_ref().unwrap().depth().to_vec();
     let vehicle: Vec<usize> = (0..depth.len()).filter(|&i| depth[i] > 0.0).collect();
@@ -740,7 +740,7 @@ fn depth_that_is_no_measurement_is_counted_and_left_out() {
 }
 
 #[test]
-fn focal_lengths_from_one_to_a_million_pixels_stay_finite_or_say_why() {
+fn focal_lengths_from_one_to_a_million_pixels_give_a_finite_result_or_an_error() {
     for focal in [1.0, 10.0, 1e4, 1e6] {
         let mut scene = right_side(64, 48);
         for view in &mut scene.views {
@@ -769,7 +769,7 @@ fn world_coordinates_instead_of_vehicle_coordinates_are_an_error() {
 }
 
 #[test]
-fn nothing_the_caller_owns_is_changed() {
+fn the_callers_scene_is_unchanged() {
     let scene = right_side(64, 48);
     let before: Vec<View> = scene.views.clone();
     run(&scene, &Options::default());
@@ -779,7 +779,7 @@ fn nothing_the_caller_owns_is_changed() {
 }
 
 #[test]
-fn never_leaves_the_unseen_side_empty_and_always_makes_it_the_mirror_image() {
+fn symmetry_never_leaves_the_unseen_side_empty_and_always_mirrors_it() {
     let scene = right_side(160, 120);
     let with = |symmetry| run(&scene, &Options { symmetry, relight: Relight::Never, ..Options::default() });
     let never = with(SymmetryMode::Never);
@@ -793,7 +793,7 @@ fn never_leaves_the_unseen_side_empty_and_always_makes_it_the_mirror_image() {
 }
 
 #[test]
-fn a_grey_picture_and_a_black_one_keep_their_colour() {
+fn grey_and_black_pictures_keep_their_colour() {
     for value in [0u8, 128, 255] {
         let mut scene = right_side(64, 48);
         for view in &mut scene.views {
@@ -828,7 +828,7 @@ fn a_huge_budget_changes_no_byte_and_no_setting() {
 }
 
 #[test]
-fn a_budget_that_cannot_be_kept_takes_the_cheapest_and_says_so() {
+fn an_impossible_budget_gives_the_cheapest_plan_and_a_warning() {
     for (scene, prior) in [
         (without_depth(right_side(160, 120)), "hull"),
         (right_side(160, 120), "given"),
@@ -856,7 +856,7 @@ fn a_budget_that_cannot_be_kept_takes_the_cheapest_and_says_so() {
 }
 
 #[test]
-fn what_a_budget_chose_gives_the_same_bytes_without_it() {
+fn the_settings_that_a_budget_chose_give_the_same_bytes_without_it() {
     let scene = without_depth(right_side(160, 120));
     let full = run(&scene, &Options { budget_s: Some(1e6), ..Options::default() }).report.plan.unwrap();
     for part in [0.8, 0.5, 0.3, 0.1, 1e-4] {
@@ -897,7 +897,7 @@ fn a_lower_resolution_makes_a_coarser_model_of_the_same_vehicle() {
 }
 
 #[test]
-fn at_most_so_many_views_are_used_and_pictures_of_one_pixel_are_no_trouble() {
+fn max_views_limits_the_views_even_with_pictures_of_one_pixel() {
     let scene = right_side(96, 72);
     let made = run(&scene, &Options { max_views: Some(2), ..Options::default() });
     assert_eq!(made.report.views_used.len(), 2);
@@ -906,7 +906,7 @@ fn at_most_so_many_views_are_used_and_pictures_of_one_pixel_are_no_trouble() {
     let dot = right_side(1, 1);
     for budget_s in [None, Some(1e-6), Some(1e6)] {
         let options = Options { budget_s, resolution: 0.1, ..Options::default() };
-        // Whether one pixel makes a vehicle does not matter; that it is no panic does.
+        // One pixel may give a vehicle or an error, but no panic.
         match reconstruct(&dot, &options, &mut |_| ControlFlow::Continue(())) {
             Ok(made) => assert!(!made.gaussians.is_empty()),
             Err(e) => assert!(!e.to_string().is_empty()),
@@ -915,7 +915,7 @@ fn at_most_so_many_views_are_used_and_pictures_of_one_pixel_are_no_trouble() {
 }
 
 #[test]
-fn budgets_resolutions_and_numbers_of_views_that_make_no_sense_are_refused() {
+fn invalid_budgets_resolutions_and_numbers_of_views_are_refused() {
     let scene = right_side(16, 12);
     let refused = |options: Options, argument: &str| {
         let error = reconstruct(&scene, &options, &mut |_| ControlFlow::Continue(())).unwrap_err();

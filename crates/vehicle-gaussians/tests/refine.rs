@@ -1,4 +1,4 @@
-//! What is promised of per-scene refinement, on an ellipsoid of which everything is known.
+//! Promises of per-scene refinement, on an ellipsoid with known geometry.
 
 use std::ops::ControlFlow;
 use vg::metrics::ViewErrors;
@@ -32,7 +32,7 @@ fn run(scene: &Scene, options: &Options) -> Reconstruction {
 }
 
 #[test]
-fn pictures_get_better_and_both_sides_stay_mirror_images() {
+fn pictures_improve_and_both_sides_stay_mirror_images() {
     let scene = right_side(96, 72);
     let made = run(&scene, &options(steps(60)));
     let done = made.report.refinement.as_ref().unwrap();
@@ -48,7 +48,7 @@ fn pictures_get_better_and_both_sides_stay_mirror_images() {
 }
 
 #[test]
-fn any_number_of_threads_gives_the_same_bytes_and_no_step_changes_next_to_nothing() {
+fn any_number_of_threads_gives_the_same_bytes_and_zero_steps_change_almost_nothing() {
     let scene = right_side(64, 48);
     let of = |threads: usize| run(&scene, &Options { threads, ..options(steps(12)) });
     let (one, two, five) = (of(1), of(2), of(5));
@@ -61,7 +61,7 @@ fn any_number_of_threads_gives_the_same_bytes_and_no_step_changes_next_to_nothin
 }
 
 #[test]
-fn seconds_are_resolved_to_steps_that_can_be_replayed() {
+fn seconds_become_a_number_of_steps_that_can_be_repeated() {
     let scene = right_side(64, 48);
     let timed = RefineOptions { amount: Amount::Seconds(0.3), ..RefineOptions::default() };
     let made = run(&scene, &options(timed));
@@ -72,7 +72,7 @@ fn seconds_are_resolved_to_steps_that_can_be_replayed() {
 }
 
 #[test]
-fn a_view_held_out_tells_when_to_stop() {
+fn a_held_out_view_determines_when_to_stop() {
     let scene = right_side(64, 48);
     let held = RefineOptions { hold_out: true, ..steps(40) };
     let made = run(&scene, &options(held));
@@ -80,15 +80,15 @@ fn a_view_held_out_tells_when_to_stop() {
     let view = done.held_out.unwrap();
     assert_eq!(view.view, scene.views[2].name);
     assert!(view.psnr_db[1] >= view.psnr_db[0], "{:?}", view.psnr_db);
-    // Of two views none can be spared.
+    // With two views, neither is held out.
     let two = Scene { views: scene.views[..2].to_vec(), ..Scene::default() };
     assert!(run(&two, &options(held)).report.refinement.unwrap().held_out.is_none());
 }
 
 #[test]
-fn who_divides_keeps_a_mirror_image() {
+fn densified_gaussians_keep_their_mirror_images() {
     let scene = right_side(64, 48);
-    // All that is seen wants company.
+    // Every visible Gaussian is to be densified.
     let densify = Some(Densify { gradient: 0.0, most: 9_000, ..Densify::for_refinement() });
     let of =
         |threads: usize| run(&scene, &Options { threads, ..options(RefineOptions { densify, ..steps(60) }) });
@@ -106,7 +106,7 @@ fn who_divides_keeps_a_mirror_image() {
 }
 
 #[test]
-fn steps_far_too_large_stay_finite_and_end_with_a_reason() {
+fn far_too_large_steps_give_finite_results_and_a_reason() {
     let scene = right_side(64, 48);
     let times = |factor: f32| {
         let RefineOptions { rates, .. } = RefineOptions::default();
@@ -132,7 +132,7 @@ fn steps_far_too_large_stay_finite_and_end_with_a_reason() {
 }
 
 #[test]
-fn exposures_are_found() {
+fn exposures_are_estimated() {
     // The second photograph is darker than the others by a quarter.
     let mut scene = right_side(96, 72);
     let darker = |rgb: &[u8; 3]| rgb.map(|c| (f32::from(c) * 0.75).round() as u8);
@@ -163,7 +163,7 @@ fn silhouettes_alone_can_be_refined() {
 }
 
 #[test]
-fn without_masks_the_background_pulls_at_nothing() {
+fn without_masks_the_background_has_no_effect() {
     let mut scene = right_side(96, 72);
     scene.views.iter_mut().for_each(|view| view.mask = None);
     let made = run(&scene, &options(steps(40)));
@@ -172,7 +172,7 @@ fn without_masks_the_background_pulls_at_nothing() {
     let (low, high) = made.gaussians.bounds().unwrap();
     for (k, half) in HALF.to_array().into_iter().enumerate() {
         let size = f64::from(high[k] - low[k]);
-        // The outline of the depth stands for a mask, whose edge is dropped: two pixels of 7 cm each on both sides.
+        // The outline of the depth is the mask, and its edge is dropped: two pixels of 7 cm each on both sides.
         assert!((2.0 * half - 0.32..2.0 * half + 0.03).contains(&size), "axis {k}: {size} of {}", 2.0 * half);
     }
 }
@@ -187,7 +187,7 @@ fn mirrored_photographs_refine_both_sides() {
 }
 
 #[test]
-fn a_model_from_anywhere_is_refined_on_threads_that_are_there_and_is_nearer_to_every_view() {
+fn a_model_from_anywhere_is_refined_on_given_threads_and_improves_in_every_view() {
     let scene = right_side(64, 48);
     let given = run(&scene, &Options { refine: None, ..options(steps(0)) }).gaussians;
     let threads = Threads::new(2).unwrap();
@@ -206,7 +206,7 @@ fn a_model_from_anywhere_is_refined_on_threads_that_are_there_and_is_nearer_to_e
 }
 
 #[test]
-fn what_cannot_be_is_refused_by_its_name() {
+fn invalid_options_are_refused_by_name() {
     let scene = right_side(48, 36);
     let bad: [(RefineOptions, &str); 5] = [
         (steps(2_000_000), "options.refine.iterations: 2000000; allowed: at most 1000000"),

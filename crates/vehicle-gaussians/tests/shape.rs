@@ -1,4 +1,4 @@
-//! The shape prior on the bundled sample, whose depth is known, and on what it has never seen.
+//! The shape prior on the bundled sample, with known depth, and on shapes outside its training data.
 
 use std::ops::ControlFlow;
 use vg::pipeline::{Options, PriorChoice, Reconstruction};
@@ -34,7 +34,7 @@ fn run(scene: &Scene, prior: PriorChoice) -> Reconstruction {
 }
 
 #[test]
-fn depth_of_the_sample_is_twice_as_good_as_the_hulls_and_photographs_better_it() {
+fn depth_of_the_sample_is_twice_as_good_as_the_hulls_and_photographs_improve_it() {
     let truth = sample::open(&INPUTS, true).unwrap();
     let hull = depth_error(&truth, &estimate(&HullPrior::default(), &truth.views));
     let learned = depth_error(&truth, &estimate(&shape(false), &truth.views));
@@ -44,7 +44,7 @@ fn depth_of_the_sample_is_twice_as_good_as_the_hulls_and_photographs_better_it()
 }
 
 #[test]
-fn the_unseen_side_of_the_sample_gains_and_no_depth_file_is_needed() {
+fn the_unseen_side_of_the_sample_improves_without_a_depth_file() {
     let (inputs, tests) = (sample::open(&INPUTS, false).unwrap(), sample::open(&UNSEEN, false).unwrap());
     let error = |prior| sample::errors(&run(&inputs, prior), &tests).unwrap();
     let (auto, hull) = (error(PriorChoice::Auto), error(PriorChoice::Hull));
@@ -69,7 +69,7 @@ fn every_vehicle_pixel_has_depth_with_a_confidence_and_masks_are_filled() {
 }
 
 #[test]
-fn confidence_falls_where_the_depth_is_wrong() {
+fn confidence_is_lower_where_the_depth_is_wrong() {
     let truth = sample::open(&INPUTS, true).unwrap();
     let geometry = estimate(&shape(false), &truth.views);
     let mut pixels: Vec<(f32, f32)> = Vec::new();
@@ -97,15 +97,15 @@ fn one_two_and_three_threads_give_the_same_bytes() {
 }
 
 #[test]
-fn an_ellipsoid_that_is_no_vehicle_is_not_made_one() {
-    // What the masks demand stays: the surface may not do worse than the hull by more than a little.
+fn an_ellipsoid_is_not_turned_into_a_vehicle() {
+    // The masks are a bound: the error may exceed that of the hull only slightly.
     let scene = right_side(320, 240);
     let hull = depth_error(&scene, &estimate(&HullPrior::default(), &scene.views));
     let shape = depth_error(&scene, &estimate(&shape(true), &scene.views));
     assert!(shape < hull + 0.03, "shape {shape:.3} m, hull {hull:.3} m");
 }
 
-/// The masks with a thin tower over the roof, as a ladder or a crane would stand there.
+/// The masks with a thin tower on the roof, such as a ladder or a crane.
 fn with_tower(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     for view in &mut scene.views {
@@ -113,7 +113,7 @@ fn with_tower(scene: &Scene) -> Scene {
         let camera_from_vehicle = camera.vehicle_from_camera.inverse();
         let mut labels = view.mask.as_ref().unwrap().labels().to_vec();
         let inside = |p: glam::DVec3| p.x.abs() < 0.25 && p.y.abs() < 0.12 && (0.4..1.35).contains(&p.z);
-        // Points of the tower, dense enough for every pixel.
+        // Points of the tower, dense enough to cover every pixel.
         let steps = |low: f64, high: f64| (0..=60).map(move |i| low + (high - low) * f64::from(i) / 60.0);
         for x in steps(-0.249, 0.249) {
             for y in steps(-0.119, 0.119).step_by(10) {
@@ -135,11 +135,11 @@ fn with_tower(scene: &Scene) -> Scene {
 }
 
 #[test]
-fn what_no_vehicle_has_is_kept_where_the_masks_show_it() {
+fn parts_unlike_the_training_data_are_kept_if_the_masks_show_them() {
     let scene = with_tower(&without_depth(right_side(320, 240)));
     let geometry = estimate(&shape(true), &scene.views);
     assert!(geometry.masks.unwrap().uncovered_after < 0.03, "{:?}", geometry.masks);
-    // Lifted pixels of the tower stand over the roof, near the middle.
+    // Lifted pixels of the tower lie above the roof, near the middle.
     let (view, depth) = (&scene.views[1], &geometry.depths[1]);
     let mut seen = 0;
     for (u, v) in (0..view.camera.height).flat_map(|v| (0..view.camera.width).map(move |u| (u, v))) {

@@ -14,7 +14,7 @@ fn vg(arguments: &[&str]) -> Output {
 }
 
 #[test]
-fn a_runtime_that_cannot_be_used_is_said_with_what_to_install() {
+fn an_unusable_runtime_is_an_error_with_what_to_install() {
     let scene = right_side(48, 36);
     let graph = ellipsoid(&scene.views[0].camera, 48, 36, Manner::PLAIN);
     let path = file("program");
@@ -47,7 +47,7 @@ fn a_runtime_that_cannot_be_used_is_said_with_what_to_install() {
 }
 
 #[test]
-fn options_that_do_not_go_together_are_refused() {
+fn incompatible_options_are_refused() {
     let sample = sample();
     let cases = [
         (["--prior", "onnx"], "--prior onnx needs a network: --prior-model M.onnx"),
@@ -64,8 +64,8 @@ fn options_that_do_not_go_together_are_refused() {
 }
 
 #[test]
-fn a_reconstruction_with_a_network_reports_how_far_it_agrees() {
-    // The sample's car is no ellipsoid: what counts is that depth and report come of the network.
+fn a_reconstruction_with_a_network_reports_its_agreement() {
+    // The sample's car is not an ellipsoid; the test is that depth and report come from the network.
     let scene = vg::io::open_scene(&sample(), &vg::io::SceneOptions::default()).unwrap().scene;
     let graph = ellipsoid(&scene.views[0].camera, 64, 48, Manner::PLAIN);
     if open("sample", &graph).is_none() {

@@ -1,6 +1,6 @@
 //! The page of `vg report` in a real browser, Chromium without a screen: pictures, script, layout, dark mode.
 //!
-//! Without Chromium it is skipped with a printed reason; `VG_NO_SKIP=1` makes that a failure.
+//! Without Chromium the tests are skipped with a printed reason; `VG_NO_SKIP=1` makes that a failure.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -12,10 +12,10 @@ use vg_testing::tools::{have, run, scratch};
 
 const BROWSER: &str = "chromium";
 
-/// A browser that has not answered by then hangs.
+/// Time limit of the browser.
 const PATIENCE: Duration = Duration::from_secs(180);
 
-/// Widths of a phone and of a screen, pixels.
+/// Widths of a phone and of a desktop screen, pixels.
 const WIDTHS: [u32; 2] = [400, 1280];
 
 /// The sample's page, made once.
@@ -30,7 +30,7 @@ fn page() -> &'static Path {
     })
 }
 
-/// Runs the browser on a page; what it printed.
+/// Runs the browser on a page and returns its output.
 fn browse(page: &Path, flags: &[&str]) -> String {
     let folder = scratch();
     let printed = folder.path().join("printed");
@@ -52,7 +52,7 @@ fn browse(page: &Path, flags: &[&str]) -> String {
         if start.elapsed() > PATIENCE {
             browser.kill().unwrap();
             browser.wait().unwrap();
-            panic!("{BROWSER} {flags:?} said nothing for {PATIENCE:?}");
+            panic!("{BROWSER} {flags:?} did not answer within {PATIENCE:?}");
         }
         std::thread::sleep(Duration::from_millis(50));
     };
@@ -61,7 +61,7 @@ fn browse(page: &Path, flags: &[&str]) -> String {
     std::fs::read_to_string(printed).unwrap()
 }
 
-/// Goes before the page's own script.
+/// Script inserted before that of the page.
 const LISTEN: &str = r#"<script>
 const complaints = [];
 addEventListener("error", (e) => complaints.push(e.message || `${e.target.tagName} failed`), true);
@@ -69,12 +69,12 @@ addEventListener("securitypolicyviolation", (e) => complaints.push(`policy: ${e.
 console.error = console.warn = (...words) => complaints.push(words.join(" "));
 </script>"#;
 
-/// Goes after it: uses the page as a reader would, and tells the page around it what happened.
+/// Script inserted after it: uses the page as a reader would, and sends the results to the surrounding page.
 const TRY: &str = r#"<script>
 const tried = async () => {
   const wait = (ms) => new Promise((done) => setTimeout(done, ms));
   const images = [...document.images];
-  // Drawn small: a picture that cannot be decoded, or is white all over, leaves nothing to see.
+  // Drawn small: an undecodable or all-white picture has no dark pixel.
   const canvas = Object.assign(document.createElement("canvas"), { width: 64, height: 64 });
   const pen = canvas.getContext("2d", { willReadFrequently: true });
   const isEmpty = (image) => {
@@ -125,18 +125,19 @@ addEventListener("load", () =>
     .then((found) => parent.postMessage(found, "*")));
 </script>"#;
 
-/// The page in frames of several widths, and what each had to tell.
-const AROUND: &str = r#"<!DOCTYPE html><body><pre id="told"></pre><script>
-const told = [];
+/// The page in frames of several widths, and the results of each.
+const AROUND: &str = r#"<!DOCTYPE html><body><pre id="results"></pre><script>
+const results = [];
 addEventListener("message", (e) => {
-  told.push(e.data);
-  document.getElementById("told").textContent = JSON.stringify(told).replaceAll("<", "\\u003c").replaceAll("&", "\\u0026");
+  results.push(e.data);
+  document.getElementById("results").textContent = JSON.stringify(results).replaceAll("<", "\\u003c").replaceAll("&", "\\u0026");
 });
 </script>"#;
 
-fn told(dumped: &str) -> Vec<Value> {
-    let text = dumped.split("<pre id=\"told\">").nth(1).and_then(|rest| rest.split("</pre>").next()).unwrap();
-    serde_json::from_str(&text.replace("&gt;", ">")).unwrap_or_else(|e| panic!("{e}: the page told {text:?}"))
+fn results(dumped: &str) -> Vec<Value> {
+    let text =
+        dumped.split("<pre id=\"results\">").nth(1).and_then(|rest| rest.split("</pre>").next()).unwrap();
+    serde_json::from_str(&text.replace("&gt;", ">")).unwrap_or_else(|e| panic!("{e}: the page sent {text:?}"))
 }
 
 #[test]
@@ -155,7 +156,7 @@ fn a_browser_shows_all_pictures_at_any_width_and_the_turntable_turns() {
     std::fs::write(&around, format!("{AROUND}{}</body>", frames.concat())).unwrap();
 
     let dumped = browse(&around, &["--dump-dom", "--virtual-time-budget=20000", "--window-size=1400,2000"]);
-    let mut all = told(&dumped);
+    let mut all = results(&dumped);
     all.sort_by_key(|one| one["width"].as_u64());
     assert_eq!(all.iter().map(|one| one["width"].as_u64().unwrap() as u32).collect::<Vec<_>>(), WIDTHS);
     for one in all {
@@ -165,7 +166,7 @@ fn a_browser_shows_all_pictures_at_any_width_and_the_turntable_turns() {
         assert!(one["narrowest"].as_f64() > Some(120.0), "{one}");
         assert_eq!(one["fetched"], 0, "{one}");
         assert_eq!(one["controls"], true, "{one}");
-        // A quarter of the way; from there back by a quarter of a turn; and on, as long as it plays.
+        // A quarter of the way; from there back by a quarter turn; and on while it plays.
         let places = ["translateY(0%)", "translateY(-25%)", "translateY(0%)"];
         assert_eq!(one["places"], serde_json::json!(places), "{one}");
         assert!((2..=6).contains(&one["played"].as_u64().unwrap()), "{one}");
@@ -174,12 +175,12 @@ fn a_browser_shows_all_pictures_at_any_width_and_the_turntable_turns() {
 }
 
 #[test]
-fn the_page_is_dark_for_readers_who_want_it_dark() {
+fn the_page_follows_the_dark_mode_of_the_browser() {
     if !have(BROWSER, BROWSER, "the report's screenshot") {
         return;
     }
     let folder = scratch();
-    // Chromium's names of the two: 0 is dark.
+    // Chromium's values for the two: 0 is dark.
     let [dark, light] = [0, 1].map(|scheme| {
         let picture = folder.path().join(format!("{scheme}.png"));
         let screenshot = format!("--screenshot={}", picture.display());
@@ -189,7 +190,7 @@ fn the_page_is_dark_for_readers_who_want_it_dark() {
     });
     let corner = |picture: &image::RgbImage| picture.get_pixel(2, 2).0;
     assert!(corner(&dark).iter().all(|c| *c < 60) && corner(&light).iter().all(|c| *c > 230));
-    // Text and photographs are there.
+    // Text and photographs are visible.
     for picture in [dark, light] {
         let colors: std::collections::HashSet<[u8; 3]> = picture.pixels().map(|p| p.0).collect();
         assert!(colors.len() > 2000, "{} colours", colors.len());

@@ -1,5 +1,5 @@
-//! Cameras, poses, similarities and spherical harmonics against other projects' numbers (scripts/golden), and the
-//! undistortion of pictures, masks and depth against the lens formulas themselves.
+//! Cameras, poses, similarities and spherical harmonics compared with results of other projects (scripts/golden), and
+//! the undistortion of pictures, masks and depth compared with the lens formulas.
 
 use glam::{DMat3, DVec3};
 use serde_json::Value;
@@ -29,7 +29,7 @@ fn point(value: &Value) -> DVec3 {
     DVec3::from_array(numbers(value))
 }
 
-/// Rows of a matrix, one after the other.
+/// The rows of a matrix, concatenated.
 fn rows<const N: usize>(value: &Value) -> [f64; N] {
     let all: Vec<f64> =
         value.as_array().unwrap().iter().flat_map(|row| numbers::<4>(row).into_iter()).collect();
@@ -55,7 +55,7 @@ fn cameras() -> Vec<(Camera, Value)> {
 }
 
 #[test]
-fn points_project_where_colmap_projects_them_to_1e_minus_9_pixels() {
+fn points_project_as_in_colmap_to_1e_minus_9_pixels() {
     for (camera, case) in cameras() {
         for (p, pixel) in list(&case, "points").iter().zip(list(&case, "pixels")) {
             let found = camera.project(point(p)).unwrap();
@@ -66,12 +66,12 @@ fn points_project_where_colmap_projects_them_to_1e_minus_9_pixels() {
 }
 
 #[test]
-fn pixels_have_the_rays_that_colmap_finds() {
+fn pixels_have_the_rays_of_colmap() {
     for (camera, case) in cameras() {
         for (pixel, ray) in list(&case, "unproject_pixels").iter().zip(list(&case, "unproject_rays")) {
             let pixel = numbers::<2>(pixel);
             let found = camera.ray(pixel).unwrap();
-            // COLMAP's inverse returns to the pixel to 1e-6 pixels; ours to 1e-9.
+            // COLMAP's inverse is accurate to 1e-6 pixels; ours to 1e-9.
             let difference = largest_difference(&[found.x, found.y], &numbers::<2>(ray));
             assert!(difference <= 1e-6, "{} {pixel:?}: {difference}", case["model"]);
             assert!(largest_difference(&camera.project(found).unwrap(), &pixel) <= 1e-9);
@@ -80,7 +80,7 @@ fn pixels_have_the_rays_that_colmap_finds() {
 }
 
 #[test]
-fn colmap_and_opengl_poses_convert_as_pycolmap_converts_them() {
+fn colmap_and_opengl_poses_convert_as_in_pycolmap() {
     for case in list(&golden("poses_pycolmap.json"), "poses") {
         let pose = pose_from_colmap("pose", numbers(&case["qvec_wxyz"]), numbers(&case["tvec"])).unwrap();
         let expected: [f64; 12] = rows(&case["world_from_cam"]);
@@ -99,7 +99,7 @@ fn colmap_and_opengl_poses_convert_as_pycolmap_converts_them() {
 }
 
 #[test]
-fn the_best_similarity_is_the_one_pycolmap_finds() {
+fn the_best_similarity_equals_that_of_pycolmap() {
     for case in list(&golden("umeyama_pycolmap.json"), "cases") {
         let points = |key: &str| list(case, key).iter().map(point).collect::<Vec<_>>();
         let found = Similarity::umeyama(&points("src"), &points("dst")).unwrap();
@@ -116,7 +116,7 @@ fn the_best_similarity_is_the_one_pycolmap_finds() {
 }
 
 #[test]
-fn the_sh_basis_is_scipy_s() {
+fn the_sh_basis_equals_that_of_scipy() {
     let file = golden("sh_scipy.json");
     for (direction, values) in list(&file, "directions").iter().zip(list(&file, "values")) {
         let found = sh::basis(numbers(direction), 3);
@@ -143,7 +143,7 @@ fn dots(lens: &Camera, ideal: &Camera) -> Vec<[f64; 2]> {
     dots
 }
 
-/// Centroid of weights in a square of `2 * reach + 1` pixels around `at`, or `None` where that leaves the picture.
+/// Centroid of weights in a square of `2 * reach + 1` pixels around `at`, or `None` if that leaves the picture.
 fn centroid(camera: &Camera, at: [f64; 2], reach: i64, weight: impl Fn(usize) -> f64) -> Option<[f64; 2]> {
     let (u0, v0) = (at[0].floor() as i64, at[1].floor() as i64);
     let mut sum = [0.0; 3];
@@ -159,10 +159,10 @@ fn centroid(camera: &Camera, at: [f64; 2], reach: i64, weight: impl Fn(usize) ->
     Some([sum[0] / sum[2], sum[1] / sum[2]])
 }
 
-/// Large enough that the steps of a hard edge average out to a few hundredths of a pixel.
+/// Radius of the dots: large enough that the steps of a hard edge average out to a few hundredths of a pixel.
 const RADIUS: f64 = 20.0;
 
-/// The picture a lens takes of discs that are round, RADIUS pixels large, on the pinhole `ideal`.
+/// The picture, through a lens, of round discs of RADIUS pixels on the pinhole `ideal`.
 fn dot_view(lens: &Camera, ideal: &Camera, dots: &[[f64; 2]]) -> View {
     let (mut pixels, mut labels, mut depth) = (Vec::new(), Vec::new(), Vec::new());
     for v in 0..lens.height {
@@ -234,13 +234,13 @@ fn undistorted_dots_lie_where_the_pinhole_projects_them_to_a_tenth_of_a_pixel() 
             let shift = sum.map(|s| 3.0 * s / f64::from(seen));
             assert!(shift.iter().all(|s| s.abs() <= 0.1), "{name} {what}: mean shift {shift:?}");
         }
-        // Some of a wide lens lie beyond what the pinhole keeps.
+        // Some dots of a wide lens lie outside the pinhole's picture.
         assert!(seen >= 3 * 12, "{name}: {seen}");
     }
 }
 
 #[test]
-fn pixels_that_the_lens_did_not_see_are_unknown_and_have_no_depth() {
+fn pixels_outside_the_lens_picture_are_unknown_and_have_no_depth() {
     let lens = Camera {
         width: 200,
         height: 150,
@@ -267,7 +267,7 @@ fn pixels_that_the_lens_did_not_see_are_unknown_and_have_no_depth() {
 }
 
 #[test]
-fn the_pinhole_of_a_crop_from_a_lens_s_corner_holds_all_that_the_crop_saw() {
+fn the_pinhole_of_a_crop_from_a_lens_s_corner_covers_the_whole_crop() {
     let wide = Distortion::Brown { k: [-0.25, 0.04, 0.0, 0.0, 0.0, 0.0], p: [0.0; 2] };
     for distortion in [wide, Distortion::Fisheye { k: [0.0; 4] }] {
         let intrinsics = Intrinsics { fx: 900.0, fy: 900.0, cx: 640.0, cy: 360.0 };

@@ -1,4 +1,4 @@
-//! COLMAP models written by pycolmap 4 (tests/make_colmap_models.py) are read as pycolmap reads them.
+//! COLMAP models written by pycolmap 4 (tests/make_colmap_models.py) have the values that pycolmap reads.
 
 use glam::DMat4;
 use serde_json::Value;
@@ -39,7 +39,7 @@ fn cameras_of_all_seven_models_and_images_of_rigs_read_as_pycolmap_wrote_them() 
             let rows: Vec<f64> =
                 e["world_from_camera"].as_array().unwrap().iter().flat_map(numbers).collect();
             for (a, b) in found.iter().zip(&rows) {
-                // Both files hold every bit; the inverse is taken once on either side.
+                // Both files hold every bit; the inverse is computed once for each.
                 assert!((a - b).abs() < 1e-14, "{kind} {}: {a} {b}", image.name.display());
             }
             model.camera_of(image).unwrap();
@@ -64,7 +64,7 @@ fn sparse_points_read_as_pycolmap_wrote_them() {
 }
 
 #[test]
-fn a_model_of_a_version_without_rigs_reads_the_same() {
+fn a_model_of_a_version_without_rigs_gives_the_same_result() {
     let dir = tempfile::tempdir().unwrap();
     for file in ["cameras.bin", "images.bin"] {
         std::fs::copy(data().join("bin").join(file), dir.path().join(file)).unwrap();
@@ -74,7 +74,7 @@ fn a_model_of_a_version_without_rigs_reads_the_same() {
 }
 
 #[test]
-fn binary_files_win_over_text_files() {
+fn binary_files_take_precedence_over_text_files() {
     let dir = tempfile::tempdir().unwrap();
     for file in ["cameras.bin", "images.bin"] {
         std::fs::copy(data().join("bin").join(file), dir.path().join(file)).unwrap();
@@ -99,7 +99,7 @@ fn a_model_without_a_gauge_is_refused_and_with_one_is_scaled_turned_and_moved() 
     let m = [0.0, -2.0, 0.0, 1.5, 2.0, 0.0, 0.0, -1.0, 0.0, 0.0, 2.0, 0.25, 0.0, 0.0, 0.0, 1.0];
     let vehicle_from_world = vg_geometry::Similarity::from_row_major("m", &m).unwrap();
     let options = SceneOptions { vehicle_from_world: Some(vehicle_from_world), ..SceneOptions::default() };
-    // The folder above, the model's own, and what lies between them are one scene.
+    // The folder above, the model's own, and those between them are one scene.
     for path in ["", "sparse", "sparse/0"] {
         let index = list_scene(&dir.path().join(path), &options).unwrap();
         assert_eq!(index.views.len(), 8);
@@ -116,7 +116,7 @@ fn a_model_without_a_gauge_is_refused_and_with_one_is_scaled_turned_and_moved() 
 }
 
 #[test]
-fn names_with_spaces_lose_no_image_with_or_without_their_features() {
+fn images_with_spaces_in_their_names_are_read_with_or_without_features() {
     use vg_scene::io::colmap::images_from_text;
     let record = |id: u32, name: &str| format!("{id} 1 0 0 0 0 0 {id}.5 1 {name}\n");
     let names = ["two  spaces here.png", "a b c.png", "plain.png"];
@@ -130,7 +130,7 @@ fn names_with_spaces_lose_no_image_with_or_without_their_features() {
             assert_eq!(found.iter().map(|i| i.name.to_str().unwrap()).collect::<Vec<_>>(), names);
         }
     }
-    // Twelve words in a line are no four features when they are the next image.
+    // Twelve words in a line that is the next image are not four features.
     let squeezed: String = names.iter().enumerate().map(|(i, name)| record(i as u32 + 1, name)).collect();
     let error = images_from_text(squeezed.as_bytes(), path).unwrap_err().to_string();
     assert!(error.contains("images.txt: line 2: not POINTS2D"), "{error}");

@@ -1,7 +1,7 @@
-//! Thousands of damaged files per reader: none may panic, and none may make a reader allocate by what it claims
-//! rather than by what it holds. The same readers are the targets of fuzz/, which needs a nightly compiler.
+//! Thousands of damaged files per reader: none may cause a panic, or an allocation by a size that the file claims
+//! rather than by its content. The same readers are the targets of fuzz/, which needs a nightly compiler.
 //!
-//! Damage is seeded, so that a failure repeats; VG_MUTATIONS says how many per reader.
+//! Damage is seeded, so that a failure repeats; VG_MUTATIONS is the number of files per reader.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::fs;
@@ -73,7 +73,7 @@ fn damaged(bytes: &[u8], random: &mut Random) -> Vec<u8> {
     ];
     let mut out = bytes.to_vec();
     for _ in 0..=random.below(4) {
-        // Headers are short and matter most.
+        // Headers are short and matter most, so they are damaged more often.
         let reach = if random.below(2) == 0 { out.len() } else { out.len().min(200) };
         let at = random.below(reach);
         let end = (at + random.below(64)).min(out.len());
@@ -150,10 +150,11 @@ fn exr() -> Vec<u8> {
 
 type Reader = (&'static str, Vec<u8>, usize, fn(&[u8]) -> bool);
 
-/// Most bytes that a reader of a small file may use, where the format has no pixels.
+/// Largest memory of a reader of a small file, for formats without pixels.
 const SMALL: usize = 8 << 20;
 
-/// A picture may be 8192 x 8192 before its data turns out to be missing: four bytes a pixel, and decoder state.
+/// Largest memory for pictures, which may be 8192 x 8192 before missing data is noticed: four bytes a pixel, and
+/// decoder state.
 const PIXELS: usize = 640 << 20;
 
 fn readers() -> Vec<Reader> {
@@ -216,7 +217,7 @@ fn readers() -> Vec<Reader> {
 fn damaged_files_never_panic_and_never_make_a_reader_allocate_by_what_they_claim() {
     let mutations = std::env::var("VG_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(3000usize);
     for (name, valid, most_bytes, accepts) in readers() {
-        assert!(accepts(&valid), "{name}: the undamaged file is refused");
+        assert!(accepts(&valid), "{name}: the reader refuses the undamaged file");
         let mut random = Random(0x9e37_79b9_7f4a_7c15);
         let (mut accepted, mut largest) = (0, 0);
         for i in 0..mutations {
@@ -240,7 +241,7 @@ fn damaged_files_never_panic_and_never_make_a_reader_allocate_by_what_they_claim
     }
 }
 
-/// The file as text for the message, its beginning only.
+/// The beginning of the file as text, for the message.
 fn dump(bytes: &[u8]) -> String {
     bytes.iter().take(600).flat_map(|b| std::ascii::escape_default(*b)).map(char::from).collect()
 }

@@ -1,4 +1,4 @@
-//! Scenes on disk: the bundled sedan by both of its descriptions, and small scenes made here.
+//! Scenes on disk: the bundled sedan by both of its descriptions, and small scenes that the tests make.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -23,9 +23,9 @@ fn sedan_colmap() -> SceneOptions {
 }
 
 #[test]
-fn the_sedan_s_two_descriptions_are_one_scene() {
+fn the_two_descriptions_of_the_sedan_give_the_same_scene() {
     let poses = open_scene(&sedan(), &SceneOptions::default()).unwrap();
-    // transforms.json wins in a folder with both, so the model is named.
+    // transforms.json takes precedence in a folder with both, so the model is named.
     let colmap = open_scene(&sedan().join("sparse/0"), &sedan_colmap()).unwrap();
     assert_eq!((poses.scene.views.len(), colmap.scene.views.len()), (8, 8));
     assert_eq!((&poses.notes, &colmap.notes), (&vec![], &vec![]));
@@ -38,7 +38,7 @@ fn the_sedan_s_two_descriptions_are_one_scene() {
         assert!((p.rotation - q.rotation).to_cols_array().iter().all(|d| d.abs() < 1e-9));
         assert_eq!(a.camera.intrinsics, b.camera.intrinsics);
     }
-    // Depth is metres off the camera, whatever the model's gauge.
+    // Depth is in metres from the camera, whatever the scale of the model.
     let depth = colmap.scene.views[0].depth.as_ref().unwrap().depth();
     let nearest = depth.iter().filter(|d| **d > 0.0).fold(f32::INFINITY, |a, &b| a.min(b));
     assert!((1.0..20.0).contains(&nearest), "{nearest}");
@@ -53,7 +53,7 @@ fn sparse_points_of_the_sedan_lie_on_a_car_in_the_vehicle_frame() {
 }
 
 #[test]
-fn the_gauge_is_found_from_camera_centres() {
+fn the_similarity_is_found_from_camera_centres() {
     let truth = list_scene(&sedan(), &SceneOptions::default()).unwrap();
     let known: Vec<_> = truth.cameras().iter().map(|c| (c.name.clone(), c.camera.center())).collect();
     let found = vehicle_from_known_centers(&sedan().join("sparse/0"), &known).unwrap();
@@ -63,7 +63,7 @@ fn the_gauge_is_found_from_camera_centres() {
 }
 
 #[test]
-fn views_are_chosen_by_path_file_name_or_stem_in_the_order_asked() {
+fn views_are_chosen_by_path_file_name_or_stem_in_the_given_order() {
     let chosen = |names: &[&str]| list_scene(&sedan(), &named(names)).map(|i| i.cameras());
     let names: Vec<String> =
         chosen(&["003", "images/001.png", "002.png", "003"]).unwrap().into_iter().map(|c| c.name).collect();
@@ -116,7 +116,7 @@ impl Small {
 }
 
 #[test]
-fn without_w_and_h_the_picture_s_size_counts() {
+fn without_w_and_h_the_size_of_the_picture_is_used() {
     let camera = Small::new("").open().unwrap().scene.views[0].camera;
     assert_eq!((camera.width, camera.height, camera.intrinsics.cx, camera.intrinsics.cy), (4, 2, 2.0, 1.0));
 }
@@ -159,7 +159,7 @@ fn masks_are_found_by_stem_by_file_name_and_in_subfolders() {
 }
 
 #[test]
-fn alpha_is_the_mask_where_there_is_no_other_and_full_alpha_says_nothing() {
+fn alpha_is_the_mask_if_there_is_no_other_and_opaque_alpha_is_ignored() {
     let small = Small::new("");
     let mut pixels = [[1, 2, 3, 255]; 8];
     write_rgba8(&small.path("images/a.png"), 4, 2, &pixels).unwrap();
@@ -173,7 +173,7 @@ fn alpha_is_the_mask_where_there_is_no_other_and_full_alpha_says_nothing() {
 }
 
 #[test]
-fn a_mask_of_zeros_and_ones_is_read_and_one_of_classes_is_an_error_that_tells_the_rule() {
+fn a_mask_of_zeros_and_ones_is_read_and_one_of_classes_is_an_error_with_the_rule() {
     let small = Small::new(r#""mask_path": "m.png","#);
     let grey = |values: [u8; 8]| write_rgb8(&small.path("m.png"), 4, 2, &values.map(|v| [v; 3])).unwrap();
     grey([0, 1, 1, 0, 0, 0, 0, 0]);
@@ -229,7 +229,7 @@ fn masks_are_found_by_every_name_in_use() {
 }
 
 #[test]
-fn what_is_missing_is_told_once_with_every_name_that_was_tried() {
+fn missing_files_give_one_note_with_every_name_that_was_tried() {
     let small = Small::new("");
     assert_eq!(
         small.open().unwrap().notes,
@@ -295,7 +295,7 @@ fn npy(descr: &str, data: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn depth_beside_a_transforms_json_that_lists_none_is_found_in_its_own_unit() {
+fn depth_next_to_a_transforms_json_that_lists_none_is_found_in_its_own_unit() {
     let floats: Vec<u8> = [2.5f32; 8].iter().flat_map(|v| v.to_le_bytes()).collect();
     let integers: Vec<u8> = [2500u16; 8].iter().flat_map(|v| v.to_le_bytes()).collect();
     let cases = [
@@ -310,7 +310,7 @@ fn depth_beside_a_transforms_json_that_lists_none_is_found_in_its_own_unit() {
         let depth = small.open().unwrap().scene.views[0].depth.clone().unwrap();
         assert_eq!(depth.depth(), [2.5; 8], "{name}");
     }
-    // Listed, it is read alike; another unit is the scene's or the caller's to say.
+    // Listed depth is read the same way; the scene or the caller can set another unit.
     let small = Small::new(r#""depth_file_path": "d.npy","#);
     fs::write(small.path("d.npy"), &cases[0].1).unwrap();
     assert_eq!(small.open().unwrap().scene.views[0].depth.as_ref().unwrap().depth(), [2.5; 8]);
@@ -333,7 +333,7 @@ fn depth_beside_a_transforms_json_that_lists_none_is_found_in_its_own_unit() {
 }
 
 #[test]
-fn the_largest_of_several_colmap_models_is_taken_and_said() {
+fn the_largest_of_several_colmap_models_is_used_with_a_note() {
     let dir = tempfile::tempdir().unwrap();
     for (model, images) in
         [("0", "1 1 0 0 0 0 0 0 1 a.png\n\n"), ("1", ""), ("10", "1 1 0 0 0 0 0 0 1 a.png\n\n")]
@@ -350,13 +350,13 @@ fn the_largest_of_several_colmap_models_is_taken_and_said() {
     let note = &index.notes[0];
     assert!(note.contains("sparse/1: chosen among 3 COLMAP models, with 2 images"), "{note}");
     assert!(note.contains("sparse/0 has 1") && note.contains("sparse/10 has 1"), "{note}");
-    // The one that is named is the one that is read.
+    // A model that is named is the one that is read.
     let named = list_scene(&dir.path().join("sparse/10"), &sedan_colmap()).unwrap();
     assert_eq!((named.views.len(), named.notes.len()), (1, 0));
 }
 
 #[test]
-fn a_turned_picture_is_refused_where_its_camera_may_be_of_either_pixels() {
+fn a_rotated_picture_is_refused_if_the_convention_of_its_camera_is_unknown() {
     // EXIF orientation 3: turned by 180 degrees.
     let exif = b"Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x03\0\0\0\0\0\0\0";
     let mut jpeg = std::io::Cursor::new(Vec::new());
@@ -397,9 +397,9 @@ fn pipes_and_devices_are_refused_and_not_waited_for() {
 }
 
 #[test]
-fn a_picture_of_the_wrong_size_is_refused_by_its_header_alone() {
+fn a_picture_of_the_wrong_size_is_refused_by_its_header() {
     let small = Small::new(r#""w": 8, "h": 4, "mask_path": "m.png", "depth_file_path": "d.png","#);
-    // A header of 4x2 and no pixel behind it: decoding it would be another error.
+    // A header of 4x2 without pixels: decoding it would be another error.
     let whole = fs::read(small.path("images/a.png")).unwrap();
     for name in ["images/a.png", "m.png", "d.png"] {
         write_rgb8(&small.path("images/a.png"), 8, 4, &[[9; 3]; 32]).unwrap();
@@ -413,7 +413,7 @@ fn a_picture_of_the_wrong_size_is_refused_by_its_header_alone() {
 }
 
 #[test]
-fn depth_is_millimetres_unless_the_scene_or_the_caller_says_otherwise() {
+fn depth_is_in_millimetres_unless_the_scene_or_the_caller_sets_another_unit() {
     let metres = [0.0, 1.234, 60.0, 70.0, f32::NAN, -1.0, 1e-5, 2.0];
     for (top, asked, expected) in [("", None, 1.234), ("2e-3", None, 2.468), ("2e-3", Some(1e-2), 12.34)] {
         let small = Small::new("");
@@ -451,10 +451,7 @@ fn the_shared_scenes_open_by_both_descriptions() {
     let root = std::env::var_os("VG_SHARED_DATA")
         .map_or_else(|| vg_testing::root().join("../shared/data"), PathBuf::from);
     if !root.join("carset").is_dir() {
-        vg_testing::say(&format!(
-            "skipped: {} has no carset (VG_SHARED_DATA says where it is)",
-            root.display()
-        ));
+        vg_testing::say(&format!("skipped: {} has no carset (VG_SHARED_DATA is its folder)", root.display()));
         return;
     }
     for instance in fs::read_dir(root.join("carset")).unwrap().map(|e| e.unwrap().path()) {
@@ -464,7 +461,7 @@ fn the_shared_scenes_open_by_both_descriptions() {
         let posed = open_scene(&instance, &SceneOptions::default()).unwrap();
         assert_eq!(posed.scene.views.len(), 40);
         assert!(posed.scene.views.iter().all(|v| v.mask.is_some() && v.depth.is_some()));
-        // The model is a real reconstruction: its centres fit the true ones to a few centimetres.
+        // The model is a real reconstruction: its centres match the true ones to a few centimetres.
         let registered = vg_scene::io::colmap::read_model(&instance.join("sparse/0")).unwrap();
         let registered: Vec<_> = registered.images.iter().map(|i| i.name.to_str().unwrap()).collect();
         let known: Vec<_> = posed

@@ -1,4 +1,4 @@
-//! PSNR and SSIM against numbers that scikit-image computed for the same pictures.
+//! PSNR and SSIM compared with scikit-image's results for the same pictures.
 
 use serde::Deserialize;
 
@@ -15,7 +15,7 @@ struct Case {
     a: Vec<u8>,
     b: Vec<u8>,
     ssim: f64,
-    /// `None` where the pictures are equal.
+    /// `None` if the pictures are equal.
     psnr: Option<f64>,
 }
 
@@ -25,7 +25,7 @@ const SSIM_TOLERANCE: f64 = 1e-7;
 const PSNR_TOLERANCE_DB: f64 = 1e-6;
 
 #[test]
-fn psnr_and_ssim_are_those_of_scikit_image() {
+fn psnr_and_ssim_equal_those_of_scikit_image() {
     let path = vg_testing::root().join("tests/golden/ssim_skimage.json");
     let golden: Golden = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
     assert!(golden.cases.len() >= 5);

@@ -1,6 +1,6 @@
 //! Renders against gsplat's float64 reference renders (golden data, not in the repository).
 //!
-//! `VG_GSPLAT_GOLDEN` or `../shared/data/gsplat_golden` holds the `.npz` files; without them the tests print so and
+//! `VG_GSPLAT_GOLDEN` or `../shared/data/gsplat_golden` holds the `.npz` files; without them the tests print a line and
 //! pass. Run with `--nocapture` for the table.
 
 use vg_geometry::Camera;
@@ -11,7 +11,7 @@ use vg_testing::golden::{camera, gaussians, golden};
 use vg_testing::npz::Npz;
 use vg_testing::{Difference, difference};
 
-/// One picture of a golden file: the Gaussians, camera and options that make it.
+/// One picture of a golden file: its Gaussians, camera and options.
 struct Case {
     name: String,
     suffix: String,
@@ -56,7 +56,7 @@ fn cases(file: &str, npz: &Npz) -> Vec<Case> {
     out
 }
 
-/// Colour, alpha and depth (relative to the largest depth of the picture, which may be 1e4 m).
+/// Differences of colour, alpha and depth (relative to the largest depth of the picture, which may be 1e4 m).
 fn against_golden(npz: &Npz, suffix: &str, color: &[f64], alpha: &[f64], depth: &[f64]) -> [Difference; 3] {
     let plane = |name: &str, found: &[f64], scale: f64| {
         let expected = &npz.array(&format!("{name}_cam0{suffix}")).values;
@@ -86,7 +86,7 @@ fn print_row(name: &str, d: &[Difference; 3]) {
     println!();
 }
 
-/// What the golden renders' own code gives in float32, with the plain conic, where it is recorded.
+/// Prints the errors of the golden renders' own code in float32 with the plain conic, where they are recorded.
 fn print_plain_f32(npz: &Npz, case: &Case) {
     let planes = ["color", "alpha", "depth"].map(|name| npz.get(&format!("{name}_f32_cam0{}", case.suffix)));
     if let [Some(color), Some(alpha), _] = planes {
@@ -112,10 +112,10 @@ fn for_each_case(
             if renderer == "f32" {
                 print_plain_f32(&npz, &case);
             }
-            // Gaussians hold unit quaternions in f32; the golden renders normalise in f64. The rounding turns a
-            // needle of axis ratio 1e4 by its own angle of 6e-8, which the f64 renderer shows alone.
+            // Gaussians hold unit quaternions in f32; the golden renders normalise in f64. The rounding turns a needle
+            // of axis ratio 1e4 by its own angle of 6e-8, which is the only error of the f64 renderer.
             let needle = case.name.contains("needle_ratio_1e4");
-            // A threshold that flips (1/255 of one pixel in 30,000) is loose in the maximum only.
+            // A threshold that flips (1/255 of one pixel in 30,000) only loosens the maximum.
             let max = match (renderer, file) {
                 ("f64", _) if needle => 5e-6,
                 ("f64", _) => 1e-6,

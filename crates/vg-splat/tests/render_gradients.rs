@@ -1,4 +1,5 @@
-//! Gradients of pictures: against gsplat's autograd, against an f64 reference, and on what breaks backward passes.
+//! Gradients of pictures, compared with gsplat's autograd and an f64 reference, and on difficult cases of backward
+//! passes.
 
 use glam::DVec3;
 use vg_geometry::Distortion;
@@ -12,7 +13,7 @@ use vg_splat::render::{Reference, RenderOptions, Rendered, Renderer};
 use vg_testing::Random;
 use vg_testing::golden::{camera, gaussians, golden};
 use vg_testing::gradients::{all_finite, difference, f64s, largest, largest_of, noise};
-use vg_testing::gradients::{loss_between, of_variable, sampled, tensors};
+use vg_testing::gradients::{gradient_entry, loss_between, sampled, tensors};
 use vg_testing::npz::Npz;
 use vg_testing::renderers::renderers;
 use vg_testing::scenes::{looking_at_origin, random};
@@ -30,7 +31,7 @@ fn relative_l2(found: &[f64], expected: &[f64]) -> f64 {
 /// Every tensor of gsplat's gradients of `sum(plane * weights)`, and its relative error here.
 fn against_golden(npz: &Npz, plane: &str, g: &Gradients) -> Vec<(String, f64)> {
     let stored = |name: &str| &npz.array(&format!("grad_{plane}_{name}")).values;
-    // gsplat's are of the quaternions before they are normalised.
+    // gsplat's gradients refer to quaternions before normalisation.
     let norms = npz
         .f32("quats_wxyz")
         .as_chunks::<4>()
@@ -115,7 +116,7 @@ fn the_reference_agrees_with_gsplats_autograd_to_1e_5() {
     check_golden("f64", &Reference, 1e-5);
 }
 
-/// Random scenes tried.
+/// Number of random scenes.
 const SCENES: u64 = 200;
 
 #[test]
@@ -144,7 +145,7 @@ fn gradients_of_200_stiff_scenes_agree_with_the_reference_to_1e_4_of_each_tensor
 }
 
 #[test]
-fn the_references_gradients_are_its_central_differences_with_cuts_held() {
+fn the_references_gradients_equal_its_central_differences_with_cuts_held() {
     let mut worst = Vec::new();
     let mut compared = 0;
     for seed in 0..SCENES {
@@ -156,7 +157,7 @@ fn the_references_gradients_are_its_central_differences_with_cuts_held() {
         for (tensor, v) in sampled(&mut r, &gaussians) {
             let scale = largest_of(&g, tensor);
             let found = difference(&p, v, &options, &cuts, &gradient, 1e-6);
-            let expected = of_variable(&g, v);
+            let expected = gradient_entry(&g, v);
             compared += usize::from(expected != 0.0);
             let relative = if scale == 0.0 { found.abs() } else { (found - expected).abs() / scale };
             worst.push((
@@ -173,7 +174,7 @@ fn the_references_gradients_are_its_central_differences_with_cuts_held() {
     assert!(compared > 1000 && worst[0].0 <= 1e-5, "{:?}", worst[0]);
 }
 
-/// Everything that was computed, as bits.
+/// All results, as bits.
 fn bits(g: &Gradients) -> Vec<u64> {
     let narrow =
         [g.means.as_flattened(), g.rotations.as_flattened(), g.scales.as_flattened(), &g.opacities, &g.sh];
@@ -212,7 +213,7 @@ fn one_two_and_five_threads_give_the_same_bytes() {
 }
 
 #[test]
-fn reused_memory_gives_the_bytes_that_new_memory_gives() {
+fn reused_memory_gives_the_bytes_of_new_memory() {
     let (mut picture, mut of_picture) = (Rendered::default(), PictureGradient::default());
     let mut gradients = Gradients::default();
     let reused = CpuRenderer::new();
@@ -234,7 +235,7 @@ fn reused_memory_gives_the_bytes_that_new_memory_gives() {
 }
 
 #[test]
-fn a_loss_that_is_flat_and_a_scene_that_is_empty_have_zero_gradients() {
+fn a_constant_loss_and_an_empty_scene_have_zero_gradients() {
     let camera = looking_at_origin(50, 40, DVec3::X, 5.0);
     let options = RenderOptions::default();
     let gaussians = random(2, 100, 2, [0.02, 0.2]);
@@ -299,7 +300,7 @@ fn an_error_of_the_loss_is_returned_and_the_renderer_still_works() {
 }
 
 #[test]
-fn a_hundred_thousand_layers_that_hardly_show_agree_with_the_reference() {
+fn a_hundred_thousand_nearly_transparent_layers_agree_with_the_reference() {
     // Just above 1/255 each, so that every pixel is finished after 2,300 of them, in several tiles.
     let n = 100_000;
     let mut r = Random::new(4);
@@ -337,7 +338,7 @@ fn extreme_numbers_give_finite_gradients() {
         means.push([0; 3].map(|_| spread * r.uniform(-1.0, 1.0) as f32));
         scales.push([0; 3].map(|_| [f32::MIN_POSITIVE, 1e-10, 1e-3, 1.0, 1e9][r.uniform(0.0, 5.0) as usize]));
         opacities.push([0.0, 1.0 / 255.0, 0.5, 1.0][r.uniform(0.0, 4.0) as usize]);
-        // The largest are cut at 1e30, where they have no gradient.
+        // The largest values are clamped at 1e30, where they have no gradient.
         let bright = [1.0, 1e6, 1e29, f32::MAX][i / 4 % 4];
         sh.extend((0..48).map(|_| bright * r.uniform(-0.5, 1.0) as f32));
     }
@@ -364,12 +365,12 @@ fn extreme_numbers_give_finite_gradients() {
     }
 }
 
-/// The fast renderer's own gradients through a lens, against differences of its own pictures.
+/// Compares the fast renderer's gradients through a lens with differences of its own pictures.
 #[test]
-fn gradients_through_a_lens_are_central_differences_of_the_pictures() {
+fn gradients_through_a_lens_equal_central_differences_of_the_pictures() {
     let mut camera = looking_at_origin(60, 44, DVec3::new(0.4, -1.0, 0.3), 6.0);
     camera.distortion = Distortion::Brown { k: [-0.1, 0.03, 0.0, 0.0, 0.0, 0.0], p: [0.01, -0.02] };
-    // One blob that is smooth enough for f32 differences: nothing is cut but its faint rim.
+    // One Gaussian, smooth enough for f32 differences: only its faint rim is cut.
     let at = |z: f32| {
         let sh = vec![0.4, -0.2, 0.9];
         let unit = vec![[0.9, 0.1, 0.4, 0.2]];
@@ -410,7 +411,7 @@ fn gradients_through_a_lens_are_central_differences_of_the_pictures() {
 }
 
 #[test]
-fn the_poses_gradient_is_the_slope_along_the_motion_it_names() {
+fn the_pose_gradient_is_the_slope_along_its_motion() {
     let Stiff { gaussians, camera, options, gradient } = stiff(12);
     let g = CpuRenderer::new().backward(&gaussians, &camera, &options, &gradient).unwrap();
     let p = |camera: &Camera| Reference.render_f64(&gaussians, camera, &options).unwrap();

@@ -1,4 +1,5 @@
-//! The fast renderers, the graphics processor's among them where it is built, against the f64 reference, its symmetries, and inputs that break renderers.
+//! The fast renderers, including the GPU renderer where it is built, compared with the f64 reference and their own
+//! symmetries, and on difficult input.
 
 use glam::{DMat3, DVec3};
 use vg_geometry::Distortion;
@@ -33,7 +34,7 @@ fn forward(width: u32, height: u32, focal: f64) -> Camera {
     Camera::pinhole(width, height, intrinsics, Pose { rotation, translation: DVec3::ZERO }).unwrap()
 }
 
-/// Fails unless colour, alpha and depth agree to `mean` on average and `max` anywhere.
+/// Asserts that colour, alpha and depth agree to `mean` on average and `max` anywhere.
 fn assert_close(name: &str, a: &Rendered, b: &Rendered, mean: f64, max: f64) {
     for (plane, d) in ["colour", "alpha", "depth"].into_iter().zip(compare(a, b)) {
         println!("{name:40} {plane:7} mean {:.1e}, 99.9 % {:.1e}, max {:.1e}", d.mean, d.p999, d.max);
@@ -41,7 +42,7 @@ fn assert_close(name: &str, a: &Rendered, b: &Rendered, mean: f64, max: f64) {
     }
 }
 
-/// Tries every fast renderer; of the CPU's kernels those it would take.
+/// Runs a test on every fast renderer; of the CPU's kernels, on the one that it would choose.
 fn each(test: impl Fn(&dyn Differentiable)) {
     for (name, renderer) in renderers().into_iter().filter(|r| r.0 != "portable") {
         println!("{name}");
@@ -49,7 +50,7 @@ fn each(test: impl Fn(&dyn Differentiable)) {
     }
 }
 
-/// `(name, Gaussians, camera)`; sizes that the brute-force reference draws in a second.
+/// `(name, Gaussians, camera)`; the reference draws each in a second.
 fn scenes() -> Vec<(&'static str, Gaussians, Camera)> {
     let side = looking_at_origin(203, 117, DVec3::new(0.4, -1.0, 0.3), 7.0);
     let mut off_center = side;
@@ -73,7 +74,7 @@ fn scenes() -> Vec<(&'static str, Gaussians, Camera)> {
 fn the_fast_renderer_agrees_with_the_reference_on_random_and_stiff_scenes() {
     each(|renderer| {
         // f32 in the blend, on colours of about 1 and depths of about 7 m. A pixel on the 1/255 cut or on the stop at
-        // 1e-4 may flip, which none of these scenes has.
+        // 1e-4 may flip; these scenes have none.
         for (name, gaussians, camera) in scenes() {
             for antialiased in [false, true] {
                 let options = RenderOptions { antialiased, depth_mode: DepthMode::Accumulated, ..options() };
@@ -102,7 +103,7 @@ fn every_sh_degree_cap_and_option_agrees_with_the_reference() {
         for options in variants {
             let found = renderer.render(&gaussians, &camera, &options).unwrap();
             let exact = Reference.render(&gaussians, &camera, &options).unwrap();
-            // Expected depth is a mean of depths, whatever is rounded.
+            // Expected depth is a mean of depths, whatever the rounding.
             assert_close(&format!("{options:?}")[..40], &found, &exact, 1e-5, 5e-5);
         }
     });
@@ -124,7 +125,7 @@ fn one_two_and_five_threads_draw_the_same_bytes() {
 }
 
 #[test]
-fn a_renderer_that_is_reused_draws_what_a_new_one_draws() {
+fn a_reused_renderer_draws_the_picture_of_a_new_one() {
     let reused = CpuRenderer::new();
     for (name, gaussians, camera) in scenes() {
         let found = reused.render(&gaussians, &camera, &options()).unwrap();
@@ -148,7 +149,7 @@ fn threads_may_share_a_renderer() {
 }
 
 #[test]
-fn portable_code_draws_what_vector_code_draws() {
+fn portable_code_draws_the_picture_of_vector_code() {
     for (name, gaussians, camera) in scenes() {
         let vector = CpuRenderer::new().render(&gaussians, &camera, &options()).unwrap();
         let portable = CpuRenderer::portable().render(&gaussians, &camera, &options()).unwrap();
@@ -158,7 +159,7 @@ fn portable_code_draws_what_vector_code_draws() {
 }
 
 #[test]
-fn the_mirrored_vehicle_from_the_mirrored_camera_is_the_flipped_picture() {
+fn the_mirrored_vehicle_from_the_mirrored_camera_gives_the_flipped_picture() {
     each(|renderer| {
         let gaussians = random(10, 5000, 3, [0.005, 0.08]);
         let mut camera = looking_at_origin(150, 100, DVec3::new(0.6, -1.0, 0.4), 6.0);
@@ -180,7 +181,7 @@ fn the_mirrored_vehicle_from_the_mirrored_camera_is_the_flipped_picture() {
 }
 
 #[test]
-fn a_camera_a_million_metres_away_sees_what_a_near_one_sees() {
+fn a_camera_a_million_metres_away_gives_the_picture_of_a_near_one() {
     each(|renderer| {
         // 1 m is a whole number of f32 steps at 2^20 m, so the moved Gaussians are the same ones.
         let mut gaussians = random(11, 300, 0, [0.01, 0.1]);
@@ -200,7 +201,7 @@ fn a_camera_a_million_metres_away_sees_what_a_near_one_sees() {
         let expected = renderer.render(&gaussians, &camera, &options()).unwrap();
         assert_close("1e6 m", &renderer.render(&moved, &far, &options()).unwrap(), &expected, 1e-7, 1e-5);
 
-        // And from 1e6 m through a telescope: nothing of the size of the vehicle is lost to f32.
+        // From 1e6 m through a telescope, nothing of the size of the vehicle is lost to f32.
         let telescope = looking_at_origin(100, 100, DVec3::new(0.3, 1.0, 0.2), 1e6);
         let telescope =
             Camera { intrinsics: Intrinsics { fx: 1.5e7, fy: 1.5e7, ..telescope.intrinsics }, ..telescope };
@@ -240,7 +241,7 @@ fn a_needle_of_ten_thousand_pixels_keeps_its_edge() {
 }
 
 #[test]
-fn expected_depth_is_the_depth_and_accumulated_depth_is_it_times_alpha() {
+fn expected_depth_is_the_depth_and_accumulated_depth_is_depth_times_alpha() {
     each(|renderer| {
         let g = one([4.0, 0.0, 0.0], UNIT, [0.2; 3], 0.8);
         let camera = forward(64, 48, 60.0);
@@ -288,7 +289,7 @@ fn only_centres_strictly_between_near_and_far_are_drawn() {
 #[test]
 fn equal_depths_are_drawn_in_the_order_of_storage() {
     each(|renderer| {
-        // A million on one ray, the first red and opaque: the picture is the first one's until it is finished.
+        // A million on one ray, the first red and opaque: the picture shows the first until it is finished.
         let n = 1_000_000;
         let mut sh = vec![0.0; 3 * n];
         sh[0] = 1.0;
@@ -353,7 +354,7 @@ fn finite_input_of_any_size_gives_a_finite_picture() {
                 }
             }
         }
-        // One at a time: what is behind an opaque one would go unseen.
+        // One at a time, because a Gaussian behind an opaque one would not be drawn.
         let camera = forward(40, 30, 30.0);
         for k in 0..all.len() {
             let one = all.filtered(&(0..all.len()).map(|i| i == k).collect::<Vec<bool>>());
@@ -364,7 +365,7 @@ fn finite_input_of_any_size_gives_a_finite_picture() {
 }
 
 #[test]
-fn gaussians_that_cover_a_large_picture_leave_it_even() {
+fn gaussians_that_cover_a_large_picture_give_an_even_picture() {
     each(|renderer| {
         // 100 splats on 64 x 128 tiles: 0.8 M pairs.
         let n = 100;
@@ -384,7 +385,7 @@ fn gaussians_that_cover_a_large_picture_leave_it_even() {
 }
 
 #[test]
-fn a_hundred_thousand_walls_cost_what_the_first_few_do() {
+fn a_hundred_thousand_walls_cost_as_much_as_the_first_few() {
     each(|renderer| {
         // 100,000 splats on 64 x 256 tiles would be 1.6e9 pairs; the first slice finishes every pixel.
         let n = 100_000;
@@ -405,7 +406,7 @@ fn a_hundred_thousand_walls_cost_what_the_first_few_do() {
 /// Windows of the largest picture: [left, top] of 64x48 pixels.
 const WINDOWS: [[u32; 2]; 3] = [[0, 0], [4064, 4072], [8128, 8144]];
 
-/// Gaussians of about four pixels in each of these windows, as a camera at the origin with this focal length sees them.
+/// Gaussians of about four pixels in each of these windows, for a camera at the origin with this focal length.
 fn in_windows(focal: f64) -> Gaussians {
     let mut r = Random::new(12);
     let n = 120;
@@ -423,7 +424,7 @@ fn in_windows(focal: f64) -> Gaussians {
 }
 
 #[test]
-fn the_largest_picture_and_its_gradients_are_those_of_its_windows() {
+fn the_largest_picture_and_its_gradients_equal_those_of_its_windows() {
     each(|renderer| {
         const SIDE: usize = 8192;
         let focal = 6000.0;
@@ -492,7 +493,7 @@ fn the_largest_picture_and_its_gradients_are_those_of_its_windows() {
     });
 }
 
-/// One lens of every model, strong enough to move pixels by several.
+/// One lens of every model, strong enough to shift pixels by several.
 fn lenses() -> Vec<(&'static str, Distortion)> {
     let brown = |k: [f64; 6], p: [f64; 2]| Distortion::Brown { k, p };
     vec![
@@ -537,11 +538,11 @@ fn through_every_lens_a_small_gaussian_is_drawn_where_the_camera_projects_it() {
 }
 
 #[test]
-fn a_lens_that_does_nothing_draws_the_pinhole_picture_up_to_interpolation() {
+fn a_lens_without_distortion_draws_the_pinhole_picture_up_to_interpolation() {
     each(|renderer| {
         let gaussians = random(13, 2000, 1, [0.02, 0.1]);
         let pinhole = looking_at_origin(200, 150, DVec3::new(0.4, -1.0, 0.3), 7.0);
-        // 1e-9 distorts nothing but is a lens.
+        // A coefficient of 1e-9 distorts nothing but is treated as a lens.
         let distortion = Distortion::Brown { k: [1e-9, 0.0, 0.0, 0.0, 0.0, 0.0], p: [0.0; 2] };
         let lens = Camera { distortion, ..pinhole };
         let expected = renderer.render(&gaussians, &pinhole, &options()).unwrap();

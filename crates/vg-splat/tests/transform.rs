@@ -1,4 +1,4 @@
-//! Moving a model into another frame: what is seen of it there is what was seen of it before.
+//! Moving a model into another frame preserves its pictures.
 
 use glam::{DMat3, DQuat, DVec3};
 use vg_geometry::Camera;
@@ -21,7 +21,7 @@ fn similarity(r: &mut Random) -> Similarity {
     Similarity { scale: r.uniform(0.1, 10.0), rotation: rotation(r), translation }
 }
 
-/// Colour of one channel before the offset of 0.5 and the clamp, which would hide errors.
+/// Colour of one channel before the offset of 0.5 and the clamp, both of which would hide errors.
 fn unclamped(coefficients: &[f32], channel: usize, direction: DVec3) -> f64 {
     let basis = sh::basis(direction.to_array(), sh::MAX_DEGREE);
     coefficients.chunks_exact(3).zip(basis).map(|(rgb, b)| f64::from(rgb[channel]) * b).sum()
@@ -39,7 +39,7 @@ fn covariance(q: [f32; 4], s: [f32; 3]) -> DMat3 {
 }
 
 #[test]
-fn the_colour_along_the_turned_direction_is_the_colour_before() {
+fn the_colour_along_the_rotated_direction_is_unchanged() {
     let mut r = Random::new(1);
     for degree in 0..=3 {
         for _ in 0..20 {
@@ -88,7 +88,7 @@ fn means_and_covariances_move_as_the_similarity_moves_points() {
 }
 
 #[test]
-fn a_moved_model_seen_by_the_moved_camera_is_the_same_picture() {
+fn a_moved_model_from_the_moved_camera_gives_the_same_picture() {
     let mut r = Random::new(4);
     let given = scenes::random(5, 500, 3, [0.02, 0.2]);
     let camera = scenes::looking_at_origin(96, 64, DVec3::new(1.0, 2.0, 0.5), 6.0);
@@ -101,7 +101,7 @@ fn a_moved_model_seen_by_the_moved_camera_is_the_same_picture() {
         CpuRenderer::default().render(model, camera, &RenderOptions::default()).unwrap()
     };
     let [color, alpha, _] = compare(&picture(&given, &camera), &picture(&moved, &moved_camera));
-    // Means are rounded anew, a Gaussian within rounding of 1/255 may be skipped in one of the two only.
+    // Means are rounded again; a Gaussian within rounding of 1/255 may be skipped in only one of the two.
     for d in [color, alpha] {
         assert!(d.mean < 1e-5 && d.max < 1.5 / 255.0, "{d:?}");
     }
@@ -151,7 +151,7 @@ fn moving_there_and_back_returns_the_model_to_the_rounding_of_f32() {
 }
 
 #[test]
-fn one_and_two_threads_move_alike() {
+fn one_and_two_threads_give_the_same_moved_model() {
     let given = scenes::random(9, 20_000, 2, [0.01, 0.1]);
     let to_from = similarity(&mut Random::new(10));
     let with = |threads| {
@@ -178,7 +178,7 @@ fn a_mean_where_an_f32_step_exceeds_a_millimetre_is_refused() {
     let model = one([0.25, 0.0, 0.0], 0.1, 0.0);
     assert_eq!(model.transformed(&shift(16_383.0)).unwrap().means()[0], [16_383.25, 0.0, 0.0]);
     assert!(model.transformed(&shift(-16_384.0)).is_ok());
-    // The limit itself, and what rounds to it.
+    // The limit itself, and numbers that round to it.
     for x in [16_383.75, 16_383.749_9, -16_384.25, 4e6, 1e300] {
         refused(&model, &shift(x), "means[0]");
     }
@@ -197,7 +197,7 @@ fn scales_and_colours_that_f32_cannot_hold_are_refused() {
 }
 
 #[test]
-fn what_is_no_similarity_is_refused() {
+fn matrices_that_are_not_similarities_are_refused() {
     let model = one([0.0; 3], 1.0, 0.0);
     for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         refused(&model, &Similarity { scale, ..Similarity::IDENTITY }, "scale");

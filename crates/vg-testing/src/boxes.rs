@@ -1,4 +1,5 @@
-//! A vehicle of boxes in a world of arbitrary gauge: masks, sparse points, and a scan, whose alignment is known.
+//! A vehicle made of boxes in a world of arbitrary position, rotation and scale: masks, sparse points, and a scan with
+//! known alignment.
 
 use super::Random;
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -14,7 +15,7 @@ fn block(x: [f64; 2], y: [f64; 2], z: [f64; 2]) -> [DVec3; 2] {
     [DVec3::new(x[0], y[0], z[0]), DVec3::new(x[1], y[1], z[1])]
 }
 
-/// 4.2 x 1.8 x 1.5 m on wheels; a cabin over the rear, or over the middle.
+/// A car of 4.2 x 1.8 x 1.5 m on wheels, with the cabin over the rear or over the middle.
 pub fn car(cabin_x: [f64; 2]) -> Shape {
     let wheel = |x: f64, y: f64| block([x - 0.3, x + 0.3], [y - 0.1, y + 0.1], [-0.75, -0.3]);
     let body = block([-2.1, 2.1], [-0.9, 0.9], [-0.55, 0.2]);
@@ -23,17 +24,17 @@ pub fn car(cabin_x: [f64; 2]) -> Shape {
     [body, cabin].into_iter().chain(wheels).collect()
 }
 
-/// A hatchback: front and back differ.
+/// A hatchback, whose front and back differ.
 pub fn hatchback() -> Shape {
     car([-2.0, 0.6])
 }
 
-/// Front and back are the same.
+/// A car with equal front and back.
 pub fn symmetric() -> Shape {
     car([-1.2, 1.2])
 }
 
-/// Where the world lies; another one for each seed.
+/// The pose and scale of the world, different for each seed.
 pub fn gauge(seed: u64) -> Similarity {
     let mut random = Random::new(seed);
     let axis = DVec3::new(random.normal(), random.normal(), random.normal()).normalize();
@@ -43,13 +44,13 @@ pub fn gauge(seed: u64) -> Similarity {
     Similarity { scale, rotation, translation: DVec3::new(part(), part(), part()) }
 }
 
-/// `vehicle_from_world` turned into its inverse.
+/// The inverse of a similarity such as `vehicle_from_world`.
 pub fn inverse(s: &Similarity) -> Similarity {
     let (scale, rotation) = (s.scale.recip(), s.rotation.transpose());
     Similarity { scale, rotation, translation: -scale * (rotation * s.translation) }
 }
 
-/// A ring of views, the first from the front left, whose poses are those of the world.
+/// A ring of views with poses in the world, the first from the front left.
 pub fn views(shape: &Shape, n: usize, vehicle_from_world: &Similarity) -> Vec<View> {
     let world_from_vehicle = inverse(vehicle_from_world);
     let view = |k: usize| {
@@ -95,14 +96,14 @@ pub fn scan(shape: &Shape, n: usize, seed: u64) -> Vec<DVec3> {
     points
 }
 
-/// Evenly over the area; not inside another box.
+/// A random point of the surface, uniform over the area and not inside another box.
 fn on_surface(shape: &Shape, random: &mut Random) -> DVec3 {
     loop {
         let [low, high] = shape[(random.bits() % shape.len() as u64) as usize];
         let size = high - low;
         let axis = (random.bits() % 3) as usize;
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        // The largest face has 8 square metres.
+        // The largest face has an area of 8 square metres.
         if random.uniform(0.0, 8.0) > size[u] * size[v] {
             continue;
         }
@@ -121,7 +122,7 @@ pub fn cloud(points: &[DVec3]) -> Cloud {
     Cloud::new(points.iter().map(|p| p.as_vec3().to_array()).collect()).unwrap()
 }
 
-/// Sparse points in the world: of the vehicle, to a centimetre, of the ground, and some that are wrong.
+/// Sparse points in the world: on the vehicle, to a centimetre, on the ground, and some outliers.
 pub fn sparse(shape: &Shape, vehicle_from_world: &Similarity, seed: u64) -> Vec<DVec3> {
     let mut random = Random::new(seed);
     let world_from_vehicle = inverse(vehicle_from_world);

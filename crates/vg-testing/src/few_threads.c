@@ -1,6 +1,6 @@
 /*
- * A system that starts few threads: preloaded, it lets a process start as many as VG_TEST_THREADS says, all in all, and
- * refuses the others as Linux does where a limit is reached.
+ * Simulates a system that starts few threads. Preloaded into a process, it lets the process start VG_TEST_THREADS
+ * threads in total, and refuses further ones as Linux does at its limit.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>

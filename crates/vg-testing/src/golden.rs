@@ -1,4 +1,4 @@
-//! The golden renders: where they are, and the scene of each.
+//! The golden renders: their folder, and the scene of each.
 
 use super::npz::Npz;
 use super::say;
@@ -8,17 +8,14 @@ use vg::gaussians::sh;
 use vg::geometry::camera::Intrinsics;
 use vg::{Camera, Gaussians, Pose};
 
-/// The folder of the golden renders, or `None`, which is printed.
+/// The folder of the golden renders. Prints a line if there is none.
 pub fn golden() -> Option<PathBuf> {
     let folder = std::env::var_os("VG_GSPLAT_GOLDEN")
         .map_or_else(|| crate::root().join("../shared/data/gsplat_golden"), PathBuf::from);
     if folder.join("extreme_256.npz").exists() {
         return Some(folder);
     }
-    say(&format!(
-        "skipped: no golden renders in {} (VG_GSPLAT_GOLDEN says where they are)",
-        folder.display()
-    ));
+    say(&format!("skipped: no golden renders in {} (VG_GSPLAT_GOLDEN is their folder)", folder.display()));
     None
 }
 
@@ -36,7 +33,7 @@ pub fn gaussians(npz: &Npz) -> Gaussians {
 pub fn camera(npz: &Npz) -> Camera {
     let m = &npz.array("viewmats").values;
     let k = &npz.array("Ks").values;
-    // The matrix as stored, orthonormal to f32 only: its transpose as the pose's rotation gives it back exactly.
+    // The stored matrix is orthonormal to f32 only; its transpose as the rotation of the pose gives it back exactly.
     let rows = DMat3::from_cols_array(&[m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]]);
     let center = -(rows.transpose().inverse() * DVec3::new(m[3], m[7], m[11]));
     Camera::pinhole(

@@ -1,9 +1,9 @@
-//! The graphics processor of this machine, or a driver that stands in for one.
+//! The GPU of this machine, or a software driver.
 
 use super::say;
 use vg::render::{Adapter, GpuRenderer};
 
-/// A renderer; or nothing, which is printed, where there is no driver. `VG_NO_SKIP` makes that a failure.
+/// A renderer. Prints a line and returns `None` if there is no driver; with `VG_NO_SKIP` that is a failure.
 pub fn renderer() -> Option<GpuRenderer> {
     match GpuRenderer::new(Adapter::Any) {
         Ok(renderer) => Some(renderer),

@@ -14,7 +14,7 @@ pub fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |m, v| v.abs().max(m))
 }
 
-/// Name, found and expected of every tensor.
+/// Name, found and expected values of every tensor.
 pub fn tensors(
     g: &Gradients,
     e: &ReferenceGradients,
@@ -34,7 +34,7 @@ pub fn tensors(
     ]
 }
 
-/// The loss whose gradient is `gradient`, of the difference of two pictures.
+/// The loss with the gradient `gradient`, of the difference of two pictures.
 pub fn loss_between(a: &ReferencePicture, b: &ReferencePicture, gradient: &PictureGradient) -> f64 {
     let color = a.color.as_flattened().iter().zip(b.color.as_flattened()).zip(gradient.color.as_flattened());
     let alpha = a.alpha.iter().zip(&b.alpha).zip(&gradient.alpha);
@@ -42,7 +42,7 @@ pub fn loss_between(a: &ReferencePicture, b: &ReferencePicture, gradient: &Pictu
     color.chain(alpha).chain(depth).map(|((a, b), g)| (a - b) * f64::from(*g)).sum()
 }
 
-/// One number of a scene that finite differences move.
+/// One number of a scene, for finite differences.
 #[derive(Clone, Copy, Debug)]
 pub enum Variable {
     Mean(usize, usize),
@@ -68,7 +68,7 @@ pub fn moved(p: &Parameters, v: Variable, step: f64) -> Parameters {
     p
 }
 
-pub fn of_variable(g: &ReferenceGradients, v: Variable) -> f64 {
+pub fn gradient_entry(g: &ReferenceGradients, v: Variable) -> f64 {
     match v {
         Variable::Mean(i, k) => g.means[i][k],
         Variable::Rotation(i, k) => g.rotations[i][k],
@@ -80,7 +80,7 @@ pub fn of_variable(g: &ReferenceGradients, v: Variable) -> f64 {
     }
 }
 
-/// The largest gradient of the tensor that [`sampled`] names so.
+/// The largest gradient of a tensor, by its name in [`sampled`].
 pub fn largest_of(g: &ReferenceGradients, tensor: &str) -> f64 {
     match tensor {
         "means" => largest(g.means.as_flattened()),
@@ -93,7 +93,7 @@ pub fn largest_of(g: &ReferenceGradients, tensor: &str) -> f64 {
     }
 }
 
-/// Two variables of each tensor, of Gaussians drawn by lot.
+/// Two variables of each tensor, of randomly chosen Gaussians.
 pub fn sampled(r: &mut Random, gaussians: &Gaussians) -> Vec<(&'static str, Variable)> {
     let mut pick = |n: usize| r.uniform(0.0, n as f64) as usize;
     let n = gaussians.len();
@@ -135,7 +135,7 @@ pub fn all_finite(g: &Gradients) -> bool {
     narrow.iter().all(|v| v.iter().all(|v| v.is_finite())) && wide.all(|v| v.is_finite())
 }
 
-/// Noise on every plane.
+/// A picture gradient of random numbers on every plane.
 pub fn noise(seed: u64, camera: &Camera) -> PictureGradient {
     let mut r = Random::new(seed);
     let pixels = (camera.width * camera.height) as usize;

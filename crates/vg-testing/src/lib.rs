@@ -1,6 +1,6 @@
-//! What tests and benches share: a seeded generator, scenes, vehicles, networks, golden files, and comparison of
+//! Code that tests and benches share: a seeded generator, scenes, vehicles, networks, golden files, and comparison of
 //! pictures.
-#![allow(missing_docs)] // for tests, whose names say it
+#![allow(missing_docs)] // for tests, whose names are the documentation
 
 pub mod boxes;
 pub mod golden;
@@ -31,7 +31,7 @@ pub fn root() -> &'static Path {
     &ROOT
 }
 
-/// Prints a line that the test harness does not swallow: why something was skipped.
+/// Prints a line past the output capture of the test harness: the reason why a test is skipped.
 pub fn say(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
@@ -52,12 +52,12 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// In [low, high).
+    /// A number in [low, high).
     pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Standard normal (Box-Muller).
+    /// A standard normal number (Box-Muller).
     pub fn normal(&mut self) -> f64 {
         let r = (-2.0 * (1.0 - self.uniform(0.0, 1.0)).ln()).sqrt();
         r * (std::f64::consts::TAU * self.uniform(0.0, 1.0)).cos()
@@ -83,7 +83,7 @@ pub fn difference(pairs: impl Iterator<Item = (f64, f64)>) -> Difference {
     }
 }
 
-/// Colour, alpha and depth of two pictures.
+/// Differences of colour, alpha and depth of two pictures.
 pub fn compare(a: &Rendered, b: &Rendered) -> [Difference; 3] {
     assert_eq!((a.width, a.height), (b.width, b.height));
     let plane = |a: &[f32], b: &[f32]| difference(a.iter().zip(b).map(|(&a, &b)| (a.into(), b.into())));

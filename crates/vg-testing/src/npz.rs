@@ -1,4 +1,5 @@
-//! NumPy's `.npz`: a zip of `.npy` arrays, as far as the golden renders use it (little-endian f4, f8, i4, U).
+//! Reads NumPy's `.npz`, a zip of `.npy` arrays, in the types that the golden renders use (little-endian f4, f8, i4,
+//! U).
 
 use std::collections::HashMap;
 use std::io::Read;

@@ -1,8 +1,8 @@
-//! The renderers that are fast, to be tried one after the other.
+//! The fast renderers, for tests that run on each of them.
 
 use vg::render::{CpuRenderer, Differentiable};
 
-/// The CPU's two, and the graphics processor's where it is built and there is one.
+/// The two CPU renderers, and the GPU renderer if it is built and a device exists.
 pub fn renderers() -> Vec<(&'static str, Box<dyn Differentiable>)> {
     let mut out: Vec<(&str, Box<dyn Differentiable>)> =
         vec![("vector", Box::new(CpuRenderer::new())), ("portable", Box::new(CpuRenderer::portable()))];

@@ -13,7 +13,7 @@ pub const INPUTS: [&str; 4] = ["000", "001", "002", "003"];
 /// The four views of the left side.
 pub const UNSEEN: [&str; 4] = ["004", "005", "006", "007"];
 
-/// Views of the sample, with or without their measured depth.
+/// Opens views of the sample, with or without their measured depth.
 pub fn open(names: &[&str], load_depth: bool) -> Result<Scene> {
     let folder = crate::root().join("tests/data/sedan");
     let views = Some(names.iter().map(ToString::to_string).collect());

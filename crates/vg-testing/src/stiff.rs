@@ -1,4 +1,4 @@
-//! Small random scenes of everything that strains a backward pass, each with options and a picture gradient.
+//! Small random scenes that combine all difficult cases of a backward pass, each with options and a picture gradient.
 
 use super::Random;
 use glam::{DMat3, DQuat, DVec3};
@@ -43,7 +43,7 @@ pub fn stiff(seed: u64) -> Stiff {
     Stiff { gaussians: gaussians(&mut r, sh_degree, &camera), camera, options, gradient }
 }
 
-/// Some metres from the origin, looking past it; its principal point is off centre.
+/// A camera some metres from the origin that looks past it, with its principal point off centre.
 fn camera(r: &mut Random, width: u32, height: u32) -> Camera {
     let eye = DVec3::new(r.normal(), r.normal(), r.normal()).normalize() * r.uniform(2.0, 9.0);
     let z = (DVec3::new(r.normal(), r.normal(), r.normal()) * 0.3 - eye).normalize();
@@ -73,14 +73,14 @@ fn gaussians(r: &mut Random, sh_degree: u8, camera: &Camera) -> Gaussians {
             0 => scale = [1e-4, 1e-4, log(r, 0.3, 3.0)],
             1 => scale = [log(r, 0.1, 1.0), log(r, 0.1, 1.0), 1e-6],
             2 => scale = [1e-10, 3.0, 1e-10],
-            // Specks and giants.
+            // Tiny and huge Gaussians.
             3 => scale = [1e-8; 3],
             4 => scale = [3.0, 2.0, 1.0],
-            // A sphere: its orientation shows nowhere.
+            // A sphere, whose orientation has no effect.
             5 => scale = [0.2; 3],
             6 => opacity = r.uniform(1.0 / 255.0, 0.02),
             7 => opacity = r.uniform(0.98, 1.0),
-            // Near the plane, beside the picture, around the camera.
+            // At the near plane, outside the picture, around the camera.
             8 => {
                 let z = log(r, 0.02, 0.3);
                 mean = in_camera(camera, DVec3::new(0.2 * r.normal() * z, 0.2 * r.normal() * z, z));
@@ -103,7 +103,7 @@ fn gaussians(r: &mut Random, sh_degree: u8, camera: &Camera) -> Gaussians {
             .collect();
         out.push(mean, q, scale, opacity, &sh);
         if kind == 11 {
-            // The same place and orientation twice, as copies of a disc are.
+            // Twice the same position and orientation, as in copies of a disc.
             out.push(mean, q, scale, r.uniform(0.1, 0.9), &sh);
         }
     }

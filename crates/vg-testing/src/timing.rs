@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-/// Sorts, so that the first is the smallest, and returns the middle one.
+/// Sorts the times and returns the middle one; the first is then the smallest.
 pub fn median(times: &mut [Duration]) -> Duration {
     times.sort();
     times[times.len() / 2]

@@ -1,4 +1,4 @@
-//! Compilers and other programs, golden files, and what to say where one is missing.
+//! Compilers and other programs, golden files, and the messages for missing ones.
 
 use crate::{root, say};
 use std::path::{Path, PathBuf};
@@ -10,20 +10,20 @@ pub fn golden() -> PathBuf {
     root().join("tests/abi/golden")
 }
 
-/// A folder that is gone after the test, on the disk of the build.
+/// A temporary folder on the disk of the build, deleted after the test.
 pub fn scratch() -> tempfile::TempDir {
     tempfile::tempdir_in(target()).expect("a folder below target")
 }
 
-/// Where cargo put this test: `target/debug/deps`.
+/// The folder of this test: `target/debug/deps`.
 pub fn target() -> PathBuf {
     let exe = std::env::current_exe().expect("the test's own path");
     exe.parent().expect("a folder").to_owned()
 }
 
-/// Whether `program` runs; where it does not, says that `what` is skipped, or fails under `VG_NO_SKIP`.
+/// Whether `program` runs. If not, prints that `what` is skipped, or fails under `VG_NO_SKIP`.
 pub fn have(program: &str, package: &str, what: &str) -> bool {
-    // Programs disagree on how to ask for the version; that they start is enough.
+    // The option for the version differs between programs; it is enough that they start.
     if Command::new(program).arg("--version").output().is_ok() {
         return true;
     }
@@ -43,10 +43,10 @@ pub fn cxx() -> String {
     std::env::var("CXX").unwrap_or_else(|_| "c++".into())
 }
 
-/// Warnings that must not be there.
+/// Flags for the warnings that must not occur.
 pub const STRICT: [&str; 4] = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"];
 
-/// Runs a program that must succeed; what it printed.
+/// Runs a program that must succeed, and returns its output.
 pub fn run(command: &mut Command) -> String {
     let output = output(command);
     assert!(
@@ -85,7 +85,7 @@ pub fn library() -> &'static Path {
     })
 }
 
-/// A folder with the shared library under the names that programs link and load.
+/// Fills a folder with the shared library under the names that programs link and load.
 pub fn library_folder(folder: &Path) {
     for name in ["libvg.so", "libvg.so.0"] {
         std::os::unix::fs::symlink(library(), folder.join(name)).expect("a link to the library");
@@ -109,7 +109,7 @@ pub fn compile(
     program
 }
 
-/// A library to preload that has a process start at most `VG_TEST_THREADS` threads.
+/// A library to preload that limits a process to `VG_TEST_THREADS` threads.
 pub fn few_threads(folder: &Path) -> PathBuf {
     let library = folder.join("few_threads.so");
     let mut command = Command::new(cc());
@@ -118,7 +118,7 @@ pub fn few_threads(folder: &Path) -> PathBuf {
     library
 }
 
-/// Compares with a golden file, or rewrites it under `VG_BLESS`. `why` says what a difference means.
+/// Compares with a golden file, or rewrites it under `VG_BLESS`. `why` explains a difference.
 pub fn assert_golden(path: &Path, found: &str, why: &str) {
     if std::env::var_os("VG_BLESS").is_some() {
         std::fs::write(path, found).expect("the golden file is written");

@@ -1,4 +1,4 @@
-//! A vehicle whose every number is known: a textured ellipsoid standing on the ground, seen by cameras around it.
+//! A vehicle with known geometry: a textured ellipsoid standing on the ground, seen by cameras around it.
 
 use glam::{DMat3, DVec3};
 use vg::geometry::{Intrinsics, Pose};
@@ -9,7 +9,7 @@ use vg::{Camera, Scene, View};
 /// Half axes, metres: 4.4 x 1.8 x 1.4 m.
 pub const HALF: DVec3 = DVec3::new(2.2, 0.9, 0.7);
 
-/// A pinhole of `width` x `height` at `azimuth` degrees (0 in front, 90 at the left), `distance` metres away
+/// A pinhole camera of `width` x `height` at `azimuth` degrees (0 in front, 90 at the left), `distance` metres away
 /// and 0.8 m above the middle, looking at it.
 pub fn camera(azimuth: f64, distance: f64, width: u32, height: u32) -> Camera {
     let (s, c) = azimuth.to_radians().sin_cos();
@@ -22,7 +22,7 @@ pub fn camera(azimuth: f64, distance: f64, width: u32, height: u32) -> Camera {
     Camera::pinhole(width, height, Intrinsics { fx: focal, fy: focal, cx, cy }, pose).unwrap()
 }
 
-/// What a camera sees of the ellipsoid: picture, exact mask, exact planar depth.
+/// The view of the ellipsoid from a camera: picture, exact mask, exact planar depth.
 pub fn view(name: &str, camera: Camera) -> View {
     let (mut pixels, mut labels, mut depth) = (Vec::new(), Vec::new(), Vec::new());
     for v in 0..camera.height {

@@ -1,8 +1,8 @@
-//! The functions of the header as data: for each that can fail, its arguments by name, a value for each that works,
-//! and values that do not. Whoever runs such a call checks what holds for every call, whatever was handed in.
+//! The functions of the header as data: for each that can fail, its arguments by name, with a valid value for each and
+//! invalid ones. Running such a call also checks the promises that hold for every call, whatever its arguments.
 //!
 //! The table test and the fuzz target share this file; `super` gives `GUARD` and `vehicle`.
-#![allow(unsafe_code, dead_code)] // each uses a part
+#![allow(unsafe_code, dead_code)] // each user needs a part
 
 use super::GUARD;
 use std::ffi::{CStr, CString, c_void};
@@ -12,13 +12,13 @@ use std::ptr::{null, null_mut};
 use vg_face::capi::*;
 use vg_testing::vehicle;
 
-/// What guards and gaps are filled with.
+/// The byte that fills guards and gaps.
 pub const CANARY: u8 = 0xA5;
 
-/// Where an out parameter points before the call: nowhere.
+/// The value of an out parameter before the call: a dangling pointer.
 const NOWHERE: usize = 0xDEAD_BEE0;
 
-/// Memory lent to the library: exactly the bytes it was promised, at any address, between guards.
+/// Memory passed to the library: exactly the promised bytes, at any address, between guards.
 pub struct Memory {
     allocation: Vec<u8>,
     start: usize,
@@ -26,7 +26,7 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// `shift` bytes from where anything may lie.
+    /// Memory `shift` bytes after an aligned address.
     pub fn new(content: &[u8], shift: usize) -> Self {
         let start = GUARD + shift;
         let mut allocation = Vec::with_capacity(start + content.len() + GUARD);
@@ -36,7 +36,7 @@ impl Memory {
         Self { before: allocation.clone(), start, allocation }
     }
 
-    pub fn of<T: Copy>(values: &[T], shift: usize) -> Self {
+    pub fn from_values<T: Copy>(values: &[T], shift: usize) -> Self {
         Self::new(bytes_of(values), shift)
     }
 
@@ -48,7 +48,7 @@ impl Memory {
         &self.allocation[self.start..self.allocation.len() - GUARD]
     }
 
-    /// Changes the content before it is lent.
+    /// Changes the content before the call.
     pub fn poke(&mut self, at: usize, bytes: &[u8]) {
         let at = self.start + at;
         self.allocation[at..at + bytes.len()].copy_from_slice(bytes);
@@ -70,12 +70,12 @@ impl Memory {
     }
 }
 
-/// The bytes of numbers.
+/// The bytes of an array of numbers.
 pub fn bytes_of<T: Copy>(values: &[T]) -> &[u8] {
     unsafe { std::slice::from_raw_parts(values.as_ptr().cast(), size_of_val(values)) }
 }
 
-/// What should come of a value.
+/// The expected result for a value.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Outcome {
     Fine,
@@ -84,30 +84,30 @@ pub enum Outcome {
 }
 use Outcome::{Fine, NotBuilt, Refused};
 
-/// Values of a number with what should come of them; the lowest bytes count.
+/// Values of a number with their expected results; the lowest bytes are used.
 pub type Tries = Vec<(u64, Outcome)>;
 
-/// Numbers that no enumeration has.
+/// Numbers that are in no enumeration.
 const NO_CHOICE: [i32; 4] = [-1, 77, i32::MIN, i32::MAX];
 
 pub fn bits32(value: i32) -> u64 {
     u64::from(value.cast_unsigned())
 }
 
-/// A number of an enumeration.
+/// Values of an enumeration.
 pub fn choice(good: &[i32]) -> Tries {
     let good = good.iter().map(|&n| (bits32(n), Fine));
     good.chain(NO_CHOICE.map(|n| (bits32(n), Refused))).collect()
 }
 
-/// The same with one that this build does not have.
+/// Values of an enumeration with one that this build lacks.
 fn choice_without(good: &[i32], missing: i32) -> Tries {
     let mut tries = choice(good);
     tries.push((bits32(missing), NotBuilt));
     tries
 }
 
-/// A field kept for later.
+/// A reserved field.
 fn reserved() -> Tries {
     vec![(0, Fine), (1, Refused), (1 << 31, Refused), (u64::MAX, Refused)]
 }
@@ -123,12 +123,12 @@ fn within64(low: f64, high: f64) -> Tries {
     [(low.to_bits(), Fine), (high.to_bits(), Fine)].into_iter().chain(bad).chain(finite()).collect()
 }
 
-/// A number that must be one.
+/// A floating-point number that must be finite.
 fn finite() -> Tries {
     [f64::NAN, f64::INFINITY, f64::NEG_INFINITY].map(|v| (v.to_bits(), Refused)).to_vec()
 }
 
-/// A part of a whole, not nothing.
+/// A share, above 0 to 1.
 fn share() -> Tries {
     let bad = [0.0, -0.0, -0.5, 1f64.next_up(), 1e300].map(|v| (v.to_bits(), Refused));
     [0.5f64, 1.0].map(|v| (v.to_bits(), Fine)).into_iter().chain(bad).chain(finite()).collect()
@@ -143,7 +143,7 @@ fn budget() -> Tries {
         .collect()
 }
 
-/// Seconds, 0 for none, few enough to be tried.
+/// Seconds, 0 for none, small enough to run.
 fn refine_seconds() -> Tries {
     let good = [0.0f64, -0.0, 1e-9].map(|v| (v.to_bits(), Fine));
     let bad = [-1.0f64, -5e-324, 86401.0].map(|v| (v.to_bits(), Refused));
@@ -158,7 +158,7 @@ fn counts(bad: &[u64]) -> Tries {
     bad.iter().map(|&n| (n, Refused)).collect()
 }
 
-/// Pointers and what goes with them: rows of their own.
+/// Pointers and their sizes, which have rows of their own.
 fn elsewhere() -> Tries {
     Vec::new()
 }
@@ -167,13 +167,13 @@ fn elsewhere() -> Tries {
 #[derive(Clone)]
 pub struct Field {
     pub name: String,
-    /// What an error calls it.
+    /// Its name in errors.
     pub word: String,
     pub offset: usize,
-    /// Of one element.
+    /// Bytes of one element.
     pub size: usize,
     pub count: usize,
-    /// Of every element.
+    /// Values to try for every element.
     pub tries: Tries,
 }
 
@@ -247,7 +247,7 @@ fn view_fields() -> Vec<Field> {
 pub struct Lent {
     pub of: &'static str,
     pub bytes: Vec<u8>,
-    /// From one element to the next; the `struct_size` it claims unless a row says otherwise.
+    /// Bytes from one element to the next; also the `struct_size`, unless a row sets another one.
     pub stride: usize,
     pub count: usize,
     pub shift: usize,
@@ -258,17 +258,17 @@ pub struct Lent {
 
 impl Lent {
     fn new<T: Copy>(of: &'static str, values: &[T], fields: Vec<Field>) -> Self {
-        Self::of_bytes::<T>(of, bytes_of(values).to_vec(), fields)
+        Self::from_bytes::<T>(of, bytes_of(values).to_vec(), fields)
     }
 
-    /// Zeros but for the size.
+    /// Zeros, except for the size.
     fn zeroed<T: Copy>(of: &'static str, fields: Vec<Field>) -> Self {
-        let mut lent = Self::of_bytes::<T>(of, vec![0; size_of::<T>()], fields);
+        let mut lent = Self::from_bytes::<T>(of, vec![0; size_of::<T>()], fields);
         lent.claim(0, size_of::<T>());
         lent
     }
 
-    fn of_bytes<T>(of: &'static str, bytes: Vec<u8>, fields: Vec<Field>) -> Self {
+    fn from_bytes<T>(of: &'static str, bytes: Vec<u8>, fields: Vec<Field>) -> Self {
         let covered: usize = fields.iter().map(|f| f.size * f.count).sum();
         assert_eq!(covered, size_of::<T>(), "the table has every field of {of}");
         let count = bytes.len() / covered;
@@ -298,8 +298,8 @@ impl Lent {
         u64::from_le_bytes(bytes)
     }
 
-    /// Makes every element `size` bytes long and say so; what is new holds `fill`. There are always the 8 bytes that
-    /// say the size.
+    /// Makes every element `size` bytes long and sets `struct_size`; added bytes are `fill`. The 8 bytes of the size
+    /// are always there.
     pub fn resize(&mut self, size: usize, fill: u8) {
         let (old, new) = (self.stride, size.max(8));
         let mut bytes = Vec::with_capacity(new * self.count);
@@ -317,7 +317,7 @@ impl Lent {
     }
 }
 
-/// Which handle comes out.
+/// The kind of a returned handle.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Made {
     Context,
@@ -343,7 +343,7 @@ impl Made {
     }
 }
 
-/// What an argument is.
+/// The kind of an argument.
 #[derive(Clone)]
 pub enum Value {
     Null,
@@ -352,7 +352,7 @@ pub enum Value {
     /// Read only.
     Doubles(Vec<f64>),
     Text(CString),
-    /// A handle of the world's.
+    /// A handle of the world.
     Handle(usize),
     Struct(Lent),
     OutHandle(Made),
@@ -362,11 +362,11 @@ pub enum Value {
 
 pub struct Argument {
     pub name: &'static str,
-    /// What an error calls it.
+    /// Its name in errors.
     pub word: &'static str,
     pub value: Value,
     pub nullable: bool,
-    /// Of a number, or of each of the doubles.
+    /// Values of a number, or of each of the doubles.
     pub tries: Tries,
 }
 
@@ -380,7 +380,7 @@ pub struct Target {
 
 type Invoke = unsafe fn(&[usize], *mut *mut vg_error) -> vg_status;
 
-/// A call that is about to be made.
+/// A call with all its arguments.
 pub struct Call {
     pub function: &'static str,
     pub arguments: Vec<Argument>,
@@ -390,16 +390,16 @@ pub struct Call {
     invoke: Invoke,
     /// Whether there is an `out_error`.
     has_error: bool,
-    /// What it returns where nothing is wrong with its arguments.
+    /// The status if its arguments are valid.
     pub good: vg_status,
 }
 
-/// What came of a call.
+/// The results of a call.
 pub struct Done {
     pub status: vg_status,
-    /// Empty where there was no `out_error`.
+    /// The message; empty without `out_error`.
     pub message: String,
-    /// What the arguments pointed to, by argument; handles of a call that succeeded.
+    /// The memory of the arguments after the call, by argument; handles of a successful call.
     pub memory: Vec<Option<Memory>>,
     pub handles: Vec<(&'static str, Made, usize)>,
 }
@@ -468,7 +468,7 @@ impl Call {
         self
     }
 
-    /// What errors call it where that is not its name.
+    /// Its name in errors if that differs.
     fn word(mut self, word: &'static str) -> Self {
         self.last().word = word;
         self
@@ -505,10 +505,10 @@ impl Call {
         }
     }
 
-    /// Makes the call and checks what holds for all of them.
+    /// Makes the call and checks the promises that hold for all calls.
     ///
     /// # Panics
-    /// Where one of the promises of the header is broken.
+    /// If one of the promises of the header is broken.
     pub fn run(&mut self, with_error: bool) -> Done {
         let mut memory: Vec<Option<Memory>> = self.arguments.iter().map(|a| lend(&a.value)).collect();
         let mut slots = vec![NOWHERE; self.arguments.len()];
@@ -590,14 +590,14 @@ impl Call {
     }
 }
 
-/// Leaves an errno that no call of the library comes by.
+/// Sets an errno that no call of the library produces.
 fn unusual_errno() -> Option<i32> {
-    // A file is no folder.
+    // Opening a file as a folder fails with ENOTDIR.
     let _ = std::fs::metadata(std::env::current_exe().unwrap_or_default().join("in it"));
     std::io::Error::last_os_error().raw_os_error()
 }
 
-/// The invariants of Gaussians.
+/// Checks the invariants of Gaussians.
 unsafe fn check_gaussians(gaussians: *const vg_gaussians) {
     unsafe {
         let n = vg_gaussians_count(gaussians);
@@ -617,7 +617,7 @@ unsafe fn check_gaussians(gaussians: *const vg_gaussians) {
         assert!(floats(vg_gaussians_opacities(gaussians), 1).iter().all(|o| (0.0..=1.0).contains(o)));
         for q in floats(vg_gaussians_rotations(gaussians), 4).chunks_exact(4) {
             let norm: f32 = q.iter().map(|v| v * v).sum();
-            // Four squares of rounded numbers.
+            // The sum of four squares of rounded numbers.
             assert!((norm - 1.0).abs() < 1e-5, "rotations are unit quaternions: {q:?}");
         }
     }
@@ -625,7 +625,7 @@ unsafe fn check_gaussians(gaussians: *const vg_gaussians) {
 
 fn lend(value: &Value) -> Option<Memory> {
     match value {
-        Value::Doubles(values) => Some(Memory::of(values, 0)),
+        Value::Doubles(values) => Some(Memory::from_values(values, 0)),
         Value::Text(text) => Some(Memory::new(text.as_bytes_with_nul(), 0)),
         Value::Struct(lent) | Value::OutStruct(lent) => Some(Memory::new(&lent.bytes, lent.shift)),
         Value::OutDoubles(count) => Some(Memory::new(&vec![CANARY; count * 8], 0)),
@@ -633,7 +633,7 @@ fn lend(value: &Value) -> Option<Memory> {
     }
 }
 
-/// Takes the error's message and frees it.
+/// Returns the message of the error and frees it.
 unsafe fn taken(error: *mut vg_error, status: vg_status) -> String {
     assert_ne!(error.addr(), NOWHERE, "out_error was not set");
     unsafe {
@@ -650,7 +650,7 @@ unsafe fn taken(error: *mut vg_error, status: vg_status) -> String {
     }
 }
 
-/// What a photograph is made of, as C has it.
+/// The memory of a photograph in C.
 pub struct Photograph {
     pub camera: vg_camera,
     pub rgb: Vec<u8>,
@@ -658,13 +658,13 @@ pub struct Photograph {
     pub depth: Vec<f32>,
 }
 
-/// Handles and pictures that calls are made with.
+/// Handles and pictures used by calls.
 pub struct World {
-    /// Of the context.
+    /// Threads of the context.
     pub threads: u32,
     pub context: usize,
     pub gaussians: usize,
-    /// Three of them, of degree 0.
+    /// Three Gaussians, of degree 0.
     pub few: usize,
     pub report: usize,
     pub renderer: usize,
@@ -726,7 +726,7 @@ impl World {
         Lent::new("vg_camera", &[self.photographs[0].camera], camera_fields())
     }
 
-    /// The views in as many formats, some with gaps between rows, some at odd addresses.
+    /// The views in several formats, some with gaps between rows, some at odd addresses.
     pub fn views(&self) -> (Lent, Vec<Memory>) {
         let mut memory = Vec::new();
         let views: Vec<vg_view> =
@@ -799,13 +799,13 @@ impl Photograph {
             pixels.flat_map(|(p, &m)| order.map(|k| [p[0], p[1], p[2], m][k])).collect()
         };
         let photograph = match i {
-            // Large enough to be taken for four bytes a pixel.
+            // Large enough for four bytes per pixel.
             0 => image(spread(&self.rgb, width * 3, width * 4 + 5, 0), 1, width * 4 + 5, vg_format::Rgb8),
             1 => image(self.rgb.clone(), 0, 0, vg_format::Rgb8),
             2 => image(masked([2, 1, 0, 3]), 3, 0, vg_format::Bgra8),
             _ => image(masked([0, 1, 2, 3]), 0, 0, vg_format::Rgba8),
         };
-        // Of an odd view, the mask is the photograph's alpha.
+        // Views with an odd index have the mask in the photograph's alpha.
         let mask = match i {
             0 => image(spread(&self.mask, width, width + 3, 0), 1, width + 3, vg_format::Gray8),
             1 => image(self.mask.clone(), 0, 0, vg_format::Gray8),
@@ -830,14 +830,14 @@ impl Photograph {
 
 const IDENTITY: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
-/// Twice the size, turned by 90 degrees about z, moved.
+/// A similarity: scale 2, a rotation by 90 degrees about z, and a translation.
 const SIMILARITY: [f64; 16] =
     [0.0, -2.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.5, 0.0, 0.0, 0.0, 1.0];
 
-/// A pose that is far from where the camera is but may be anywhere.
+/// A valid pose far from that of the camera.
 const POSE: [f64; 12] = [0.0, -1.0, 0.0, 4e5, 1.0, 0.0, 0.0, 5e6, 0.0, 0.0, 1.0, 100.0];
 
-/// A call that works, for each function that can fail.
+/// A valid call of each function that can fail.
 pub const CALLS: [fn(&World) -> Call; 72] = [
     context_options_init,
     context_new,
@@ -913,7 +913,7 @@ pub const CALLS: [fn(&World) -> Call; 72] = [
     scene_get_view,
 ];
 
-/// `sizeof` in the release that introduced them: no caller has shorter ones.
+/// `sizeof` in the release that introduced each struct: no caller has a shorter one.
 pub const FIRST_SIZES: [(&str, usize); 22] = [
     ("vg_context_options", 16),
     ("vg_camera", 280),
@@ -1127,7 +1127,7 @@ pub fn pose_from_opencv(_: &World) -> Call {
         .argument("out", Value::OutDoubles(12))
 }
 
-/// Where a camera stands, what it looks at, what is up.
+/// Position of a camera, its target, and up.
 fn sight(call: Call) -> Call {
     call.argument("eye", Value::Doubles(vec![3.0, -4.0, 1.5]))
         .tries(finite())
@@ -1143,7 +1143,7 @@ pub fn pose_look_at(_: &World) -> Call {
         .argument("out", Value::OutDoubles(12))
 }
 
-/// Bits of a number that a function takes by value, between these, neither included.
+/// Bit patterns of a number passed by value, between these two, exclusive.
 fn between(low: f64, high: f64) -> Tries {
     let bad = [low, high, -1e300, 1e300].map(|v| (v.to_bits(), Refused));
     bad.into_iter().chain(finite()).collect()
@@ -1213,7 +1213,7 @@ pub fn cameras_turntable(w: &World) -> Call {
 /// Points on the vehicle, all in front of the camera.
 const POINTS: [f64; 6] = [0.5, -0.25, 0.5, -1.0, 0.25, 0.0];
 
-/// What no memory holds.
+/// A size larger than any memory.
 fn too_many() -> Tries {
     counts(&[1 << 60, u64::MAX])
 }
@@ -1352,7 +1352,7 @@ pub const FEW: [&[f32]; 5] = [
 ];
 
 pub fn gaussians_from_arrays(_: &World) -> Call {
-    let mut memory: Vec<Memory> = FEW.iter().map(|values| Memory::of(values, 0)).collect();
+    let mut memory: Vec<Memory> = FEW.iter().map(|values| Memory::from_values(values, 0)).collect();
     let pointers: Vec<usize> = memory.iter_mut().map(Memory::pointer).collect();
     Call::new("vg_gaussians_from_arrays", invoke!(vg_gaussians_from_arrays 0 1))
         .argument("arrays", Value::Struct(arrays(3, pointers.try_into().unwrap(), 0)))
@@ -1382,7 +1382,7 @@ pub fn gaussians_merge(w: &World) -> Call {
 }
 
 pub fn gaussians_select(w: &World) -> Call {
-    let mut indices = Memory::of(&[2usize, 0, 2, 1], 0);
+    let mut indices = Memory::from_values(&[2usize, 0, 2, 1], 0);
     Call::new("vg_gaussians_select", invoke!(vg_gaussians_select 0 1 2 3))
         .argument("gaussians", Value::Handle(w.few))
         .argument("indices", Value::Handle(indices.pointer()))
@@ -1394,7 +1394,7 @@ pub fn gaussians_select(w: &World) -> Call {
 }
 
 pub fn gaussians_mask(w: &World) -> Call {
-    let mut keep = Memory::of(&[1u8, 0, 255], 0);
+    let mut keep = Memory::from_values(&[1u8, 0, 255], 0);
     Call::new("vg_gaussians_mask", invoke!(vg_gaussians_mask 0 1 2 3))
         .argument("gaussians", Value::Handle(w.few))
         .argument("keep", Value::Handle(keep.pointer()))
@@ -1434,7 +1434,7 @@ fn few_ply(w: &World) -> Vec<u8> {
 
 pub fn gaussians_load_ply_memory(w: &World) -> Call {
     let bytes = few_ply(w);
-    let mut data = Memory::of(&bytes, 1);
+    let mut data = Memory::from_values(&bytes, 1);
     Call::new("vg_gaussians_load_ply_memory", invoke!(vg_gaussians_load_ply_memory 0 1 2))
         .argument("data", Value::Handle(data.pointer()))
         .argument("size", Value::Number(bytes.len() as u64))
@@ -1519,7 +1519,7 @@ fn model_options() -> Lent {
     Lent::zeroed::<vg_model_options>("vg_model_options", fields)
 }
 
-/// A file that is not there: what is wrong with an argument is said first.
+/// A missing file: errors of arguments take precedence.
 pub fn model_open(w: &World) -> Call {
     let mut call = Call::new("vg_model_open", invoke!(vg_model_open 0 1 2))
         .argument("path", Value::Text(text(w.scratch.join("no.onnx"))))
@@ -1530,7 +1530,7 @@ pub fn model_open(w: &World) -> Call {
     call
 }
 
-/// With networks, one without a model, which `options.prior_model` tells.
+/// The last one, a network, has no model in builds with networks: the error names `options.prior_model`.
 fn priors() -> Tries {
     match vg::onnx::is_built() {
         true => [choice(&[0, 1, 2, 4]), counts(&[3])].concat(),
@@ -1663,7 +1663,7 @@ fn target(planes: [(usize, usize); 3]) -> Lent {
     Lent::new("vg_image_target", &[value], fields)
 }
 
-/// A picture of the world's size without memory from the first to the last byte of its last pixel, gaps in it.
+/// A picture of the world's size, without memory between the first byte and the last byte of its last pixel, with gaps.
 pub fn blank(height: u32, row: usize, stride: usize, shift: usize, is_float: bool) -> Target {
     let memory = Memory::new(&vec![CANARY; (height as usize - 1) * stride + row], shift);
     Target { memory, row, stride, is_float }
@@ -1673,7 +1673,7 @@ pub fn render(w: &World) -> Call {
     render_as(w, "vg_render", w.camera())
 }
 
-/// The same function with a camera whose straight lines are bent: another way through the renderer.
+/// `vg_render` with a distorted camera, which takes another path through the renderer.
 pub fn render_through_a_lens(w: &World) -> Call {
     let mut camera = w.camera();
     camera.put("model", 0, vg_camera_model::Opencv as u64);
@@ -1720,7 +1720,7 @@ pub fn renderer_new(w: &World) -> Call {
 pub fn renderer_render(w: &World) -> Call {
     let (mut lent, targets) = pictures();
     let mut cameras = w.camera();
-    // Of one each.
+    // Arrays of one element each.
     (lent.is_array, cameras.is_array) = (true, true);
     for field in &mut lent.fields {
         field.word = field.word.replace("target.size", "size");
@@ -1749,7 +1749,7 @@ fn pictures() -> (Lent, Vec<Target>) {
     (target([planes[0], planes[1], planes[2]]), targets)
 }
 
-/// Bytes from row to row of the planes of a gradient: colour without gaps, alpha and depth with some.
+/// Row strides in bytes of the planes of a gradient: colour without gaps, alpha and depth with gaps.
 pub const GRADIENT_STRIDES: [usize; 3] = [0, 4 * WIDTH as usize + 1, 4 * WIDTH as usize + 4];
 
 /// Gradients of colour, alpha and depth.
@@ -1819,24 +1819,24 @@ fn gradients(count: usize, degree: i32, arrays: [usize; 8]) -> Lent {
     Lent::new("vg_gradients", &[value], fields)
 }
 
-/// Numbers of both signs that repeat with no side of the picture.
+/// Numbers of both signs, with a period that divides no side of the picture.
 pub fn noise(n: usize) -> Vec<f32> {
     (0..n).map(|i| ((i * 7919) % 1009) as f32 / 1009.0 - 0.5).collect()
 }
 
-/// Goes back without a picture.
+/// A backward call without a picture.
 pub fn render_backward(w: &World) -> Call {
     backward_as(w, w.camera(), false)
 }
 
-/// The other way through the renderer.
+/// A backward call with a distorted camera, which takes another path through the renderer.
 pub fn render_backward_through_a_lens(w: &World) -> Call {
     let mut straight = render_through_a_lens(w);
     let camera = straight.lent("camera").clone();
     backward_as(w, camera, false)
 }
 
-/// The picture comes along.
+/// A backward call that also returns the picture.
 pub fn render_backward_with_a_picture(w: &World) -> Call {
     backward_as(w, w.camera(), true)
 }
@@ -1846,7 +1846,7 @@ fn backward_as(w: &World, camera: Lent, has_picture: bool) -> Call {
     let row = WIDTH as usize * 4;
     let (color, plane) = (noise(3 * pixels), noise(pixels));
     let mut memory = vec![
-        Memory::of(&color, 1),
+        Memory::from_values(&color, 1),
         Memory::new(&spread(bytes_of(&plane), row, GRADIENT_STRIDES[1], 0), 2),
         Memory::new(&spread(bytes_of(&plane), row, GRADIENT_STRIDES[2], 0), 3),
     ];
@@ -1854,7 +1854,7 @@ fn backward_as(w: &World, camera: Lent, has_picture: bool) -> Call {
     let (n, degree) =
         unsafe { (vg_gaussians_count(w.gaussians as _), vg_gaussians_sh_degree(w.gaussians as _)) };
     let sh = 3 * (degree as usize + 1).pow(2);
-    // Each array is one row of a picture, at an address of its own.
+    // Each array is one row of a picture, at its own address.
     let mut arrays: Vec<Target> = [12 * n, 12 * n, 16 * n, 4 * n, 4 * sh * n, 24, 48, 128]
         .iter()
         .enumerate()
@@ -1874,7 +1874,7 @@ fn backward_as(w: &World, camera: Lent, has_picture: bool) -> Call {
         .argument("gradient", Value::Struct(image_gradient([planes[0], planes[1], planes[2]])))
         .argument("out", Value::Struct(out))
         .memory(memory);
-    // What a gradient of colour on a transparent background is of.
+    // On a transparent background, the gradient of colour refers to premultiplied colour.
     call.lent("options").put("alpha", 0, vg_alpha::Premultiplied as u64);
     call.targets = arrays;
     if has_picture {
@@ -1894,11 +1894,11 @@ fn segment_options(context: usize) -> Lent {
     lent
 }
 
-/// Without a model, which is told last; the picture lies at an odd address.
+/// Without a model; the error of that comes last. The picture is at an odd address.
 pub fn segment(w: &World) -> Call {
     let mut memory = Vec::new();
     let view = w.photographs[0].view(0, &mut memory);
-    memory.push(Memory::of(&[view.image], 3));
+    memory.push(Memory::from_values(&[view.image], 3));
     let image = memory.last_mut().expect("a picture").pointer();
     let stride = WIDTH as usize + 5;
     let mut mask = blank(HEIGHT, WIDTH as usize, stride, 1, false);
@@ -1979,7 +1979,7 @@ pub fn metrics_pictures(w: &World) -> Call {
     let mut memory = Vec::new();
     let mut picture = |i: usize| {
         let view = w.photographs[i].view(i, &mut memory);
-        memory.push(Memory::of(&[view.image], 3));
+        memory.push(Memory::from_values(&[view.image], 3));
         memory.last_mut().expect("a picture").pointer()
     };
     let (a, b) = (picture(0), picture(2));
@@ -2004,10 +2004,10 @@ pub fn metrics_view(w: &World) -> Call {
         .memory(memory)
 }
 
-/// Points that lie anywhere: whether they fit the model is not looked at.
+/// Arbitrary points; whether they fit the model is not checked.
 pub fn metrics_surface(w: &World) -> Call {
     let points: Vec<f32> = (0..3 * SCAN_POINTS).map(|i| (i as f32).sin()).collect();
-    let mut points = Memory::of(&points, 0);
+    let mut points = Memory::from_values(&points, 0);
     Call::new("vg_metrics_surface", invoke!(vg_metrics_surface 0 1 2 3 4))
         .argument("gaussians", Value::Handle(w.gaussians))
         .argument("points", Value::Handle(points.pointer()))
@@ -2049,23 +2049,23 @@ fn alignment() -> Lent {
     Lent::zeroed::<vg_alignment>("vg_alignment", fields)
 }
 
-/// Points that lie anywhere.
+/// Arbitrary points.
 fn anywhere() -> Vec<f64> {
     (0..3 * SCAN_POINTS).map(|i| (i as f64).sin()).collect()
 }
 
-/// Views of which cameras and masks are looked at.
+/// Views whose cameras and masks are read.
 fn masked_views(w: &World) -> (Lent, Vec<Memory>) {
     let (mut views, memory) = w.views();
     views.fields.retain(|field| !field.name.starts_with("image") && !field.name.starts_with("depth"));
     (views, memory)
 }
 
-/// With a scan that shows no surface, which is told last.
+/// With a scan that has no surface; the error of that comes last.
 pub fn align_scan(w: &World) -> Call {
     let (views, mut memory) = masked_views(w);
-    let mut sparse = Memory::of(&anywhere(), 0);
-    let mut scan = Memory::of(&anywhere().iter().map(|v| *v as f32).collect::<Vec<f32>>(), 0);
+    let mut sparse = Memory::from_values(&anywhere(), 0);
+    let mut scan = Memory::from_values(&anywhere().iter().map(|v| *v as f32).collect::<Vec<f32>>(), 0);
     let (world, points) = (sparse.pointer(), scan.pointer());
     memory.extend([sparse, scan]);
     let mut call = Call::new("vg_align_scan", invoke!(vg_align_scan 0 1 2 3 4 5 6 7))
@@ -2086,10 +2086,10 @@ pub fn align_scan(w: &World) -> Call {
     call
 }
 
-/// With points that show no ground, which is told last.
+/// With points that have no ground; the error of that comes last.
 pub fn align_box(w: &World) -> Call {
     let (views, mut memory) = masked_views(w);
-    let mut sparse = Memory::of(&anywhere(), 0);
+    let mut sparse = Memory::from_values(&anywhere(), 0);
     let world = sparse.pointer();
     memory.push(sparse);
     let mut call = Call::new("vg_align_box", invoke!(vg_align_box 0 1 2 3 4 5 6))
@@ -2128,7 +2128,7 @@ pub fn align_points(_: &World) -> Call {
     call
 }
 
-/// With a file of three points, which is told last.
+/// With a file of three points; the error of that comes last.
 pub fn align_folder(w: &World) -> Call {
     let mut call = Call::new("vg_align_folder", invoke!(vg_align_folder 0 1 2 3))
         .argument("path", Value::Text(text(&w.sample)))
@@ -2166,7 +2166,7 @@ fn scene_options(context: usize) -> Lent {
 fn names() -> Vec<Memory> {
     let mut names = vec![Memory::new(b"001\0", 0), Memory::new(b"000.png\0", 0)];
     let pointers: Vec<usize> = names.iter_mut().map(Memory::pointer).collect();
-    names.push(Memory::of(&pointers, 0));
+    names.push(Memory::from_values(&pointers, 0));
     names
 }
 
@@ -2174,7 +2174,7 @@ fn open(w: &World, function: &'static str, invoke: Invoke, path: &Path) -> Call 
     let (mut memory, mut options) = (names(), scene_options(w.context));
     options.put("names", 0, memory[2].pointer() as u64);
     options.put("name_count", 0, 2);
-    memory.push(Memory::of(&SIMILARITY, 4));
+    memory.push(Memory::from_values(&SIMILARITY, 4));
     options.put("vehicle_from_world", 0, memory[3].pointer() as u64);
     Call::new(function, invoke)
         .argument("path", Value::Text(text(path)))

@@ -1,15 +1,15 @@
-//! Cameras as photographers and cars have them: one to eight views of one side.
+//! Cameras like those of photographers and cars: one to eight views of one side.
 
 use glam::{DMat3, DVec3};
 use rand::Rng;
 use rand_distr::{Distribution, Normal};
 use vg::geometry::{Camera, Intrinsics, Pose};
 
-/// Pictures are this large, pixels: the network's lattice is coarser than what these resolve.
+/// Size of the pictures in pixels; they resolve more than the network's lattice.
 pub const WIDTH: u32 = 256;
 pub const HEIGHT: u32 = 192;
 
-/// Cameras around a vehicle of `size` metres whose middle is `middle`; the ground is z = 0.
+/// Random cameras around a vehicle of `size` metres whose middle is `middle`; the ground is z = 0.
 pub fn draw(size: DVec3, middle: DVec3, rng: &mut impl Rng) -> Vec<Camera> {
     let n = match rng.random_range(0..100) {
         0..8 => 1,
@@ -21,7 +21,7 @@ pub fn draw(size: DVec3, middle: DVec3, rng: &mut impl Rng) -> Vec<Camera> {
         _ => 8,
     };
     let close = rng.random_bool(0.06);
-    // From a handheld ring around the vehicle to a sensor that drives by far away.
+    // From a handheld ring around the vehicle to a sensor that passes far away.
     let radius = 0.5 * size.x.hypot(size.y);
     let nearest = (radius + 1.5).max(4.0);
     let far = rng.random_bool(0.3);
@@ -35,7 +35,7 @@ pub fn draw(size: DVec3, middle: DVec3, rng: &mut impl Rng) -> Vec<Camera> {
     let fan = if n == 1 { 0.0 } else { rng.random_range(25.0..155.0f64).max(12.0 * (n - 1) as f64) };
     let middle_azimuth = 90.0 + rng.random_range(-0.5..0.5) * (200.0 - fan).max(30.0);
     let side = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
-    // The whole vehicle in the picture, as photographers do.
+    // The whole vehicle is in the picture, as with photographers.
     let filled = rng.random_range(0.45..0.95) * if close { 1.6 } else { 1.0 };
     let same_lens = rng.random_bool(0.8);
     let spread = Normal::new(0.0, 1.0).expect("a deviation above 0");
@@ -51,14 +51,14 @@ pub fn draw(size: DVec3, middle: DVec3, rng: &mut impl Rng) -> Vec<Camera> {
             let aim =
                 middle + wobble * size * DVec3::from_array(std::array::from_fn(|_| 0.5 * spread.sample(rng)));
             let roll = (0.01 * spread.sample(rng)).clamp(-0.05, 0.05);
-            // How wide the vehicle looks from here.
+            // Angular width of the vehicle from here.
             let across = size.x * azimuth.sin().abs() + size.y * azimuth.cos().abs();
             let needed = (across / (d - 0.3 * across).max(1.0) / f64::from(WIDTH))
                 .max(size.z / (d - 0.4 * across).max(1.0) / f64::from(HEIGHT));
             if !same_lens || focal == 0.0 {
                 focal = filled / needed;
             }
-            // No lens cuts what the plan wants whole.
+            // The lens must not cut a vehicle that is to be complete.
             let f = if close { focal } else { focal.min(0.97 / needed) };
             looking_at(aim, center, roll, f, (WIDTH, HEIGHT))
         })

@@ -1,10 +1,10 @@
-//! A vehicle on a grid, and what cameras see of it.
+//! A vehicle sampled on a grid, and its views from cameras.
 
 use crate::vehicle::Vehicle;
 use glam::Vec3;
 use vg::geometry::Camera;
 
-/// Nodes along each side of the blocks that are looked at as one.
+/// Nodes along each side of the blocks that are tested as one.
 const BLOCK: usize = 4;
 
 /// Half a vehicle as values on nodes, positive inside.
@@ -20,8 +20,8 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// About `finest` metres between nodes, more for long vehicles.
-    pub fn of(vehicle: &Vehicle, finest: f32) -> Self {
+    /// Samples a vehicle with about `finest` metres between nodes, more for long vehicles.
+    pub fn from_vehicle(vehicle: &Vehicle, finest: f32) -> Self {
         let extent = vehicle.high - vehicle.low;
         let step = finest.max(extent.x / 220.0);
         let nodes = [extent.x, extent.y, extent.z].map(|e| (e / step).ceil() as usize + 1);
@@ -35,7 +35,7 @@ impl Grid {
             let first = [block % blocks[0], block / blocks[0] % blocks[1], block / (blocks[0] * blocks[1])]
                 .map(|b| b * BLOCK);
             let middle = node(first[0], first[1], first[2]) + 0.5 * step * (BLOCK - 1) as f32;
-            // The function changes by at most about twice the way: far from the surface one value will do.
+            // The function changes by at most about twice the distance: far from the surface one value is enough.
             let f_middle = vehicle.inside(middle);
             let far = f_middle.abs() > 2.0 * step * BLOCK as f32;
             for k in first[2]..(first[2] + BLOCK).min(nodes[2]) {
@@ -55,7 +55,7 @@ impl Grid {
         Self { low, step, nodes, values, low_inside, high_inside }
     }
 
-    /// How far inside the vehicle `p` is, metres: the function over its slope, which near the surface is the
+    /// Distance of `p` inside the vehicle, metres: the function over its slope, which near the surface is the
     /// distance.
     pub fn distance(&self, p: Vec3) -> f32 {
         let f = self.sample(p);
@@ -81,7 +81,7 @@ impl Grid {
         lerp(along_y(base), along_y(base + nx * ny), f.z)
     }
 
-    /// Planar depth of what `camera` sees, metres, 0 where it sees none. `[height * width]`
+    /// Planar depth from `camera`, metres, 0 where the ray misses. `[height * width]`
     pub fn depth(&self, camera: &Camera) -> Vec<f32> {
         let (width, height) = (camera.width as usize, camera.height as usize);
         let mut depth = vec![0.0; width * height];
@@ -120,7 +120,7 @@ impl Grid {
                 return 0.5 * (outside + inside);
             }
             before = z;
-            // The function is a distance only roughly: no long leaps.
+            // The function is a distance only roughly, so steps are short.
             z += (-0.7 * f).clamp(0.5 * self.step, 8.0 * self.step) / length;
         }
         0.0

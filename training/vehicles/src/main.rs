@@ -1,4 +1,4 @@
-//! Makes procedural vehicles and what the shape network learns from: the hull that a few noisy silhouettes carve,
+//! Makes procedural vehicles and the training data of the shape network: the hull that a few noisy silhouettes carve,
 //! and the vehicle's true signed distance, on the network's lattice.
 
 mod cameras;
@@ -24,7 +24,7 @@ use vg::prior::volume::{KnownBox, Silhouette, find_box};
 /// Distances are clamped to this in the training data, metres.
 const DISTANCE_CLAMP_M: f32 = 0.25;
 
-/// Scenes of each vehicle: shapes cost more than views.
+/// Scenes per vehicle: shapes cost more than views.
 const SCENES_PER_VEHICLE: usize = 3;
 
 #[derive(Parser)]
@@ -60,7 +60,7 @@ fn main() -> std::io::Result<()> {
     }
 }
 
-/// Each vehicle has a random sequence of its own: the data do not depend on the number of threads.
+/// Each vehicle has its own random sequence: the data do not depend on the number of threads.
 pub fn random(seed: u64, vehicle: usize) -> Pcg64Mcg {
     Pcg64Mcg::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ vehicle as u64)
 }
@@ -92,7 +92,7 @@ fn data(vehicles: usize, seed: u64, output: &Path) -> std::io::Result<()> {
 fn records(seed: u64, index: usize) -> Vec<Vec<u8>> {
     let mut rng = random(seed, index);
     let vehicle = vehicle::draw(&mut rng);
-    let grid = Grid::of(&vehicle, 0.035);
+    let grid = Grid::from_vehicle(&vehicle, 0.035);
     (0..SCENES_PER_VEHICLE).filter_map(|_| record(&vehicle, &grid, &mut rng)).collect()
 }
 

@@ -1,4 +1,4 @@
-//! What is wrong with real poses and masks.
+//! Errors of real poses and masks.
 
 use crate::cameras::{HEIGHT, WIDTH};
 use glam::{DMat3, DVec3};
@@ -6,15 +6,15 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use vg::geometry::{Camera, Pose};
 
-/// How much is wrong in one scene.
+/// Amounts of error in one scene.
 pub struct Noise {
     turn: f64,
     shift: f64,
     plane_yaw: f64,
     plane_offset: f64,
-    /// Pixels that every mask is too large (or too small) by.
+    /// Pixels by which every mask is too large (or, if negative, too small).
     grown: i32,
-    /// Chance that something stands in front of the vehicle in a view.
+    /// Probability that an object stands in front of the vehicle in a view.
     occluded: f64,
 }
 
@@ -38,22 +38,22 @@ impl Noise {
         }
     }
 
-    /// The pose as it would be told.
-    pub fn told(&self, camera: &Camera, rng: &mut impl Rng) -> Camera {
+    /// The camera with the errors of its pose.
+    pub fn noisy_camera(&self, camera: &Camera, rng: &mut impl Rng) -> Camera {
         let mut normal = || -> f64 { StandardNormal.sample(rng) };
         let axis = DVec3::new(normal(), normal(), normal()) * self.turn;
         let turn = DMat3::from_axis_angle(axis.normalize_or(DVec3::X), axis.length());
         let shift = DVec3::new(normal(), normal(), normal()) * self.shift;
         let yaw = DMat3::from_rotation_z(self.plane_yaw);
         let pose = camera.vehicle_from_camera;
-        let told = Pose {
+        let noisy = Pose {
             rotation: yaw * pose.rotation * turn,
             translation: yaw * (pose.translation + shift) + DVec3::Y * self.plane_offset,
         };
-        Camera { vehicle_from_camera: told, ..*camera }
+        Camera { vehicle_from_camera: noisy, ..*camera }
     }
 
-    /// The mask as it would be told. `[height * width]`
+    /// The mask with its errors. `[height * width]`
     pub fn mask(&self, seen: &[f32], rng: &mut impl Rng) -> Vec<u8> {
         let mut mask: Vec<u8> = seen.iter().map(|z| if *z > 0.0 { 255 } else { 0 }).collect();
         for _ in 0..self.grown.abs() {
@@ -66,7 +66,7 @@ impl Noise {
     }
 }
 
-/// One pixel larger, or smaller.
+/// The mask, one pixel larger or smaller.
 fn grown(mask: &[u8], larger: bool) -> Vec<u8> {
     let (w, h) = (WIDTH as usize, HEIGHT as usize);
     let at = |u: usize, v: usize| mask[v * w + u];
@@ -84,7 +84,7 @@ fn grown(mask: &[u8], larger: bool) -> Vec<u8> {
         .collect()
 }
 
-/// Something in front: a bush along the bottom, a post, another vehicle's end.
+/// Covers a part of the mask: a bush along the bottom, a post, the end of another vehicle.
 fn occlude(mask: &mut [u8], rng: &mut impl Rng) {
     let (w, h) = (WIDTH as usize, HEIGHT as usize);
     let rows: Vec<usize> = (0..h).filter(|v| mask[v * w..(v + 1) * w].contains(&255)).collect();

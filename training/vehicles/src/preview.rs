@@ -17,7 +17,7 @@ pub fn draw(seed: u64, output: &Path) -> std::io::Result<()> {
         for column in 0..PER_CLASS {
             let mut rng = crate::random(seed, row * 100 + column as usize);
             let vehicle = vehicle::draw_class(*class, &mut rng);
-            let grid = Grid::of(&vehicle, 0.025);
+            let grid = Grid::from_vehicle(&vehicle, 0.025);
             let camera = camera(&grid, 40.0 + 20.0 * f64::from(column));
             let depth = grid.depth(&camera);
             for (x, y, shade) in shades(&camera, &depth) {
@@ -28,7 +28,7 @@ pub fn draw(seed: u64, output: &Path) -> std::io::Result<()> {
     picture.save(output).map_err(std::io::Error::other)
 }
 
-/// From `azimuth` degrees, a little above.
+/// A camera at `azimuth` degrees, a little above.
 fn camera(grid: &Grid, azimuth: f64) -> Camera {
     let middle = 0.5 * (grid.low_inside + grid.high_inside).as_dvec3() * DVec3::new(1.0, 0.0, 1.0);
     let size = f64::from(grid.high_inside.x - grid.low_inside.x);

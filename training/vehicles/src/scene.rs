@@ -1,4 +1,4 @@
-//! A vehicle photographed: views as the library takes them, with what is true beside them.
+//! A photographed vehicle: views as input of the library, and their true values.
 
 use crate::cameras::{self, HEIGHT, WIDTH};
 use crate::grid::Grid;
@@ -8,7 +8,8 @@ use rand::Rng;
 use vg::View;
 use vg::scene::{DepthMap, Mask, RgbImage};
 
-/// Views with noise in their masks and poses; `View::depth` is true. `None` where some view shows too little of the vehicle.
+/// Views with noise in their masks and poses; `View::depth` is true. `None` if some view shows too little of the
+/// vehicle.
 pub fn draw(grid: &Grid, rng: &mut impl Rng) -> Option<Vec<View>> {
     let low = Vec3::new(grid.low_inside.x, -grid.high_inside.y, grid.low_inside.z).as_dvec3();
     let high = grid.high_inside.as_dvec3();
@@ -24,7 +25,7 @@ pub fn draw(grid: &Grid, rng: &mut impl Rng) -> Option<Vec<View>> {
         }
         views.push(View {
             name: String::new(),
-            camera: noise.told(camera, rng),
+            camera: noise.noisy_camera(camera, rng),
             image: image.clone(),
             mask: Some(
                 Mask::from_strided("mask", &mask, WIDTH, HEIGHT, WIDTH as usize).expect("of its size"),

@@ -2,13 +2,13 @@
 
 use glam::{Vec2, Vec3};
 
-/// Smaller of two, with a fillet of width `k` where they meet: the edge of an intersection, rounded.
+/// Minimum of two values with a fillet of width `k`: the rounded edge of an intersection.
 pub fn smooth_min(a: f32, b: f32, k: f32) -> f32 {
     let h = (k - (a - b).abs()).max(0.0) / k;
     a.min(b) - 0.25 * h * h * k
 }
 
-/// Larger of two, with a fillet: the crease of a union, filled.
+/// Maximum of two values with a fillet: the filled crease of a union.
 pub fn smooth_max(a: f32, b: f32, k: f32) -> f32 {
     -smooth_min(-a, -b, k)
 }
@@ -23,12 +23,12 @@ pub fn rounded_box(p: Vec3, center: Vec3, half: Vec3, radius: f32) -> f32 {
 pub fn ellipsoid(p: Vec3, center: Vec3, half: Vec3) -> f32 {
     let q = (p - center) / half;
     let length = q.length();
-    // Gradient of |q| along p, to make metres of it.
+    // Gradient of |q| along p, to convert to metres.
     let gradient = (q / half).length() / length.max(1e-3);
     (1.0 - length) / gradient.max(1.0 / half.max_element())
 }
 
-/// Inside the half-plane below or behind the line from `a` to `b` (to the right of the way from a to b) in the
+/// The half-plane below or behind the line from `a` to `b` (to the right of the direction from a to b) in the
 /// (x, z) plane.
 pub fn right_of(p: Vec2, a: Vec2, b: Vec2) -> f32 {
     let way = (b - a).normalize();

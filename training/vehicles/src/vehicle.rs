@@ -1,8 +1,8 @@
 //! Parametric vehicles: nine classes, each a family of shapes.
 //!
 //! A vehicle is its own mirror image in y = 0; here the ground is z = 0 and x = 0 lies half way between the
-//! bumpers. It is put together from a lower body (a profile from the side, a plan, and a section with rocker,
-//! belly and shoulder), a cabin or box on it, wheels in their arches, and parts that stick out.
+//! bumpers. It consists of a lower body (a profile from the side, a plan, and a section with rocker, belly and
+//! shoulder), a cabin or box on it, wheels in their arches, and parts that stick out.
 
 use crate::solid::{Curve, ellipsoid, right_of, rounded_box, smooth_max, smooth_min};
 use glam::{Vec2, Vec3};
@@ -21,7 +21,7 @@ pub enum Class {
     Bus,
 }
 
-/// How often each class is drawn.
+/// Relative frequency of each class.
 pub const CLASSES: [(Class, f32); 9] = [
     (Class::Sedan, 0.15),
     (Class::Hatchback, 0.16),
@@ -38,23 +38,23 @@ pub const CLASSES: [(Class, f32); 9] = [
 struct Lower {
     top: Curve,
     half_width: f32,
-    /// Ends of the body, and how the plan rounds off towards them: depth and exponent.
+    /// Ends of the body, and the rounding of the plan towards them: depth and exponent.
     front: f32,
     rear: f32,
     front_round: Vec2,
     rear_round: Vec2,
-    /// How far the fascias lean back per metre above and below the height of the bumpers.
+    /// Inclination of the fascias: metres back per metre above and below the height of the bumpers.
     front_lean: Vec2,
     rear_lean: Vec2,
     bumper_z: f32,
     clearance: f32,
-    /// How much higher the underside is at the ends.
+    /// Rise of the underside at the ends, metres.
     overhang_rise: f32,
-    /// How far the side tucks in at the rocker and leans in towards the shoulder, metres per metre squared.
+    /// Inclination of the side towards the rocker and the shoulder, metres per metre squared.
     tuck: f32,
     shoulder: f32,
     belly_z: f32,
-    /// How much lower the bonnet is at its sides.
+    /// Drop of the bonnet at its sides, metres.
     crown: f32,
     fillet: f32,
 }
@@ -69,7 +69,7 @@ struct Cabin {
     belt: f32,
     /// Metres inwards per metre of height.
     tumblehome: f32,
-    /// How much narrower it gets towards its ends.
+    /// Narrowing towards its ends.
     taper: f32,
     roof_curve: f32,
     roof_crown: f32,
@@ -100,7 +100,7 @@ enum Part {
         center: Vec3,
         half: Vec3,
     },
-    /// Cut out of everything before it.
+    /// A volume cut out of all earlier parts.
     Hollow {
         center: Vec3,
         half: Vec3,
@@ -116,7 +116,7 @@ struct Wave {
 
 pub struct Vehicle {
     pub class: Class,
-    /// Corners that hold it, x and z; |y| up to `high.y`.
+    /// Corners of its bounding box, x and z; |y| up to `high.y`.
     pub low: Vec3,
     pub high: Vec3,
     lower: Lower,
@@ -128,14 +128,14 @@ pub struct Vehicle {
 }
 
 impl Vehicle {
-    /// Positive inside, about metres.
+    /// The implicit function: positive inside, about the distance in metres.
     pub fn inside(&self, p: Vec3) -> f32 {
         let p = Vec3::new(p.x, p.y.abs(), p.z);
         let mut f = self.lower.inside(p);
         if let Some(cabin) = &self.cabin {
             f = smooth_max(f, cabin.inside(p), self.blend);
         }
-        // Panels are never quite what the few numbers above say.
+        // Real panels are never exactly described by a few numbers.
         f += self.waves.iter().map(|w| w.height * (w.direction.dot(p) + w.phase).sin()).sum::<f32>();
         f = self.wheels.cut(p, f);
         for part in &self.parts {
@@ -208,12 +208,12 @@ impl Wheels {
         self.axles.iter().map(near).fold(f32::INFINITY, f32::min)
     }
 
-    /// Takes the arches out of the body and puts lips around them.
+    /// Cuts the arches out of the body and adds lips around them.
     fn cut(&self, p: Vec3, f: f32) -> f32 {
         let rho = self.radial(p);
         let lip =
             (self.flare - (rho - self.arch - self.flare).abs()).min(self.outer + 0.5 * self.flare - p.y);
-        // A lip runs along the body's edge, not in the air below it.
+        // A lip follows the edge of the body, not the air below it.
         let lip = lip.min(p.y - self.outer + 0.1).min(f + 0.05);
         let f = if self.flare > 0.0 { smooth_max(f, lip, 0.04) } else { f };
         f.min(-(self.arch - rho).min(p.y - (self.outer - self.arch_depth)))
@@ -226,7 +226,7 @@ impl Wheels {
     }
 }
 
-/// Draws a vehicle.
+/// A random vehicle.
 pub fn draw(rng: &mut impl Rng) -> Vehicle {
     let total: f32 = CLASSES.iter().map(|c| c.1).sum();
     let mut pick = rng.random::<f32>() * total;
@@ -237,12 +237,12 @@ pub fn draw(rng: &mut impl Rng) -> Vehicle {
     draw_class(class.map_or(Class::Sedan, |c| c.0), rng)
 }
 
-/// Draws a vehicle of this class.
+/// A random vehicle of this class.
 pub fn draw_class(class: Class, rng: &mut impl Rng) -> Vehicle {
     Draft::new(class, rng).vehicle(rng)
 }
 
-/// The proportions that the rest follows from.
+/// The basic proportions.
 struct Draft {
     class: Class,
     length: f32,
@@ -295,7 +295,7 @@ impl Draft {
             _ => {
                 let (foot, cabin) = self.cabin(rng, &mut parts);
                 let lower = self.lower(rng, foot, &cabin);
-                // The windows stand on the shoulder, not beyond it.
+                // The windows are on the shoulder, not beyond it.
                 let shoulder = lower.shoulder * (self.belt - lower.belly_z).max(0.0).powi(2);
                 (lower, Some(Cabin { half_width: cabin.half_width - shoulder, ..cabin }))
             }
@@ -374,7 +374,7 @@ impl Draft {
             Class::Pickup => rng.random_range(0.19..0.26) * l,
             _ => rng.random_range(0.05..0.22) * l.min(5.5),
         };
-        // Rakes are run over height, so that low roofs get long screens.
+        // Rakes are horizontal length over height, so that low roofs get long windscreens.
         let screen_run = match self.class {
             Class::Suv | Class::Pickup => rng.random_range(0.55..1.5),
             Class::Van => rng.random_range(0.35..1.3),
@@ -731,7 +731,7 @@ impl Draft {
         }
     }
 
-    /// Two mirrors; returns how far out they reach.
+    /// Adds two mirrors. Returns their distance from the middle.
     fn mirrors(
         &self,
         rng: &mut impl Rng,

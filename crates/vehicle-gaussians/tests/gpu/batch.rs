@@ -1,4 +1,4 @@
-//! Pictures of many cameras in one call: those of single calls, in order, whatever goes on meanwhile.
+//! Pictures of many cameras in one call equal those of single calls, in order, whatever is drawn meanwhile.
 
 use crate::{alone, options};
 use glam::DVec3;
@@ -12,7 +12,7 @@ use vg_testing::gpu::renderer;
 use vg_testing::gradients::noise;
 use vg_testing::scenes::{looking_at_origin, random};
 
-/// Small and large, near enough that pairs do not fit at first, and one with a lens.
+/// Cameras with small and large pictures, near enough that pairs do not fit at first, and one with a lens.
 fn cameras() -> Vec<Camera> {
     let from = DVec3::new(0.4, -1.0, 0.3);
     let distortion = Distortion::Brown { k: [-0.1, 0.03, 0.0, 0.0, 0.0, 0.0], p: [0.01, -0.02] };
@@ -34,7 +34,7 @@ fn gaussians() -> Gaussians {
 }
 
 #[test]
-fn each_picture_is_that_of_a_single_call_whatever_is_drawn_meanwhile() {
+fn each_picture_equals_that_of_a_single_call_whatever_is_drawn_meanwhile() {
     if renderer().is_none() {
         return;
     }
@@ -112,7 +112,7 @@ fn batches_single_pictures_and_gradients_of_several_threads_do_not_mix() {
 }
 
 #[test]
-fn errors_come_after_the_pictures_before_them() {
+fn errors_are_returned_after_the_preceding_pictures() {
     let Some(gpu) = renderer() else { return };
     let asset = gpu.upload(&random(5, 700, 1, [0.02, 0.1])).unwrap();
     let mut cameras = cameras();
@@ -135,11 +135,11 @@ fn errors_come_after_the_pictures_before_them() {
         taken == [0, 1, 2, 3] && result.clone().unwrap_err().starts_with("camera"),
         "{taken:?} {result:?}"
     );
-    assert_eq!(run(&gpu, &cameras[..4], 9), (vec![0, 1, 2, 3], Ok(())), "it goes on");
+    assert_eq!(run(&gpu, &cameras[..4], 9), (vec![0, 1, 2, 3], Ok(())), "the renderer still works");
 }
 
 #[test]
-fn the_cpu_draws_what_is_left_when_the_device_goes_between_two_pictures() {
+fn the_cpu_draws_the_remaining_pictures_if_the_device_is_lost_between_two() {
     if renderer().is_none() {
         return;
     }

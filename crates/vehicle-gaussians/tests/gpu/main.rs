@@ -1,5 +1,5 @@
-//! The renderer on a graphics processor: what is its own, beside the pictures and gradients that `render_golden`,
-//! `render_numerics` and `render_gradients` ask of every renderer, and what may go wrong with a device.
+//! The GPU renderer: its own behaviour, in addition to the tests of pictures and gradients of every renderer in
+//! `render_golden`, `render_numerics` and `render_gradients`, and faults of a device.
 
 mod batch;
 
@@ -22,7 +22,7 @@ use vg_testing::gradients::noise;
 use vg_testing::scenes::{forward, looking_at_origin, random, surfel_car};
 use vg_testing::vehicle::right_side;
 
-/// Held by tests of the device that the process shares: one of them loses it.
+/// Lock for tests of the device that the process shares, because one of them loses the device.
 fn alone() -> MutexGuard<'static, ()> {
     static SHARED: Mutex<()> = Mutex::new(());
     SHARED.lock().unwrap_or_else(PoisonError::into_inner)
@@ -34,7 +34,7 @@ fn options() -> RenderOptions {
     RenderOptions { background: Background::Color([0.1, 0.2, 0.3]), ..RenderOptions::default() }
 }
 
-/// `n` walls before the camera, a millimetre apart.
+/// `n` walls in front of the camera, a millimetre apart.
 fn walls(n: usize, opacity: f32, size: f32) -> Gaussians {
     let means = (0..n).map(|i| [5.0 + i as f32 * 1e-3, 0.0, 0.0]).collect();
     let sh = vec![0.5; 3 * n];
@@ -49,7 +49,7 @@ fn assert_close(name: &str, a: &Rendered, b: &Rendered, mean: f64, max: f64) {
 }
 
 #[test]
-fn through_a_lens_it_draws_what_the_cpu_does() {
+fn through_a_lens_it_draws_the_picture_of_the_cpu() {
     let Some(gpu) = renderer() else { return };
     let gaussians = random(9, 2000, 2, [0.01, 0.1]);
     let distortion = Distortion::Brown { k: [-0.1, 0.03, 0.0, 0.0, 0.0, 0.0], p: [0.01, -0.02] };
@@ -65,9 +65,10 @@ fn through_a_lens_it_draws_what_the_cpu_does() {
 }
 
 #[test]
-fn depths_are_in_order_among_150_000_and_equal_ones_in_the_order_of_storage() {
+fn depths_of_150_000_are_sorted_and_equal_ones_keep_the_order_of_storage() {
     let Some(gpu) = renderer() else { return };
-    // More than one block of the sort, than one level of the sums; a third of them equal, and not in order.
+    // More than one block of the sort and one level of the sums; a third of the depths are equal, and they are not
+    // sorted.
     let car = surfel_car(150_000);
     let camera = looking_at_origin(256, 192, DVec3::new(0.4, -1.0, 0.3), 7.0);
     let expected = CpuRenderer::new().render(&car, &camera, &options()).unwrap();
@@ -136,7 +137,7 @@ fn gradients_are_the_same_bytes_in_bands_windows_and_repeated_walks() {
     assert!(expected.means.iter().filter(|m| **m != [0.0; 3]).count() > 300);
     assert!(gpu.backward(&gaussians, &camera, &options(), &gradient).unwrap() == expected, "a second time");
 
-    // With its picture, and what the picture left is used; the loss may draw meanwhile.
+    // With its picture, and reusing memory after the picture; the loss may draw meanwhile.
     let asset = gpu.upload(&random(4, 300, 0, [0.1, 0.2])).unwrap();
     for meanwhile in [false, true] {
         let (mut picture, mut of_picture, mut found) = Default::default();
@@ -163,14 +164,14 @@ fn gradients_are_the_same_bytes_in_bands_windows_and_repeated_walks() {
     ];
     for (name, gpu) in same {
         let found = gpu.backward(&gaussians, &camera, &options(), &gradient).unwrap();
-        // Tiles' shares of the background are rounded once, and added up in f64.
+        // The tiles' sums of the background are rounded once, and added up in f64.
         for c in 0..3 {
             assert!((found.background[c] - expected.background[c]).abs() < 1e-12, "{name}");
         }
         let found = Gradients { background: expected.background, ..found };
         assert!(found == expected, "{name}");
     }
-    // Windows of columns come in another order than rows: sums differ in rounding.
+    // Windows of columns have another order than rows: sums differ in rounding.
     let found = bounded(|b| b.pairs = 1).backward(&gaussians, &camera, &options(), &gradient).unwrap();
     let largest = |v: &[f32]| v.iter().fold(0.0f32, |m, v| m.max(v.abs()));
     for (a, b) in [
@@ -185,7 +186,7 @@ fn gradients_are_the_same_bytes_in_bands_windows_and_repeated_walks() {
 }
 
 #[test]
-fn bytes_are_those_of_the_planes_rounded() {
+fn byte_pictures_equal_the_rounded_planes() {
     let Some(gpu) = renderer() else { return };
     let gaussians = random(17, 3000, 2, [0.005, 0.2]);
     let camera = looking_at_origin(200, 150, DVec3::new(0.4, -1.0, 0.3), 5.0);
@@ -205,7 +206,7 @@ fn bytes_are_those_of_the_planes_rounded() {
                         assert!(bytes.pixels == expected.collect::<Vec<_>>());
                     }
                     Background::Transparent => {
-                        // The device divides by alpha less exactly: one level, where it was a tie.
+                        // The device divides by alpha less exactly: one level at ties.
                         let expected = planes.to_rgba8();
                         let pairs = bytes.pixels.as_flattened().iter().zip(expected.as_flattened());
                         let off = pairs.clone().filter(|(a, b)| a != b).count();
@@ -218,7 +219,7 @@ fn bytes_are_those_of_the_planes_rounded() {
 }
 
 #[test]
-fn the_largest_picture_an_empty_one_and_one_with_all_culled() {
+fn the_largest_an_empty_and_a_fully_culled_picture_are_drawn() {
     let Some(gpu) = renderer() else { return };
     let n = 30;
     let means = (0..n).map(|i| [5.0, 3.4 - 0.23 * i as f32, 3.4 - 0.23 * i as f32]).collect();
@@ -243,7 +244,7 @@ fn the_largest_picture_an_empty_one_and_one_with_all_culled() {
     }
 }
 
-/// Behind the camera of [`forward`].
+/// Moves the Gaussians behind the camera of [`forward`].
 trait Behind {
     fn transformed_behind(self) -> Self;
 }
@@ -256,11 +257,11 @@ impl Behind for Gaussians {
     }
 }
 
-/// Mesa's driver for the CPU gives a thread 65,535 turns of its loops and goes on as if they had ended.
+/// Mesa's driver for the CPU limits a thread to 65,535 iterations of its loops and then continues as if they had ended.
 #[test]
-fn lists_that_a_driver_does_not_finish_make_slices_and_errors_and_no_wrong_pictures() {
+fn lists_beyond_the_loop_limit_of_a_driver_give_slices_or_errors_and_no_wrong_pictures() {
     let Some(gpu) = renderer() else { return };
-    // All in one corner of a tile, whose other pixels go through them in vain.
+    // All in one corner of a tile, whose other pixels iterate over them too.
     let corner = |n: usize| {
         let means = (0..n).map(|i| [5.0 + i as f32 * 1e-5, -0.2, -0.2]).collect();
         let (scales, sh) = (vec![[1e-4; 3]; n], vec![0.5; 3 * n]);
@@ -270,7 +271,7 @@ fn lists_that_a_driver_does_not_finish_make_slices_and_errors_and_no_wrong_pictu
     let (picture_of, gradient_of) = (corner(70_000), corner(40_000));
     let gradient = noise(2, &camera);
     let cpu = CpuRenderer::new();
-    // A picture goes on in slices.
+    // A picture is drawn again in slices.
     let expected = cpu.render(&picture_of, &camera, &options()).unwrap();
     assert_close("corner", &gpu.render(&picture_of, &camera, &options()).unwrap(), &expected, 1e-6, 2e-5);
     match gpu.backward(&gradient_of, &camera, &options(), &gradient) {
@@ -282,7 +283,7 @@ fn lists_that_a_driver_does_not_finish_make_slices_and_errors_and_no_wrong_pictu
             assert!(gpu.is_software() && e.to_string().contains("ends long loops early"), "{e}");
         }
     }
-    // What it finishes it still draws.
+    // Lists below the limit are still drawn.
     let few = corner(5000);
     let expected = cpu.render(&few, &camera, &options()).unwrap();
     assert!(expected.alpha.iter().any(|a| *a > 0.9));
@@ -290,7 +291,7 @@ fn lists_that_a_driver_does_not_finish_make_slices_and_errors_and_no_wrong_pictu
 }
 
 #[test]
-fn a_lost_device_and_what_does_not_fit_are_errors_that_say_so() {
+fn a_lost_device_and_too_large_input_are_errors_that_name_the_cause() {
     let Some(gpu) = renderer() else { return };
     let g = random(12, 100, 0, [0.01, 0.1]);
     let camera = looking_at_origin(64, 48, DVec3::X, 7.0);
@@ -339,7 +340,7 @@ fn eight_threads_share_one_renderer() {
 }
 
 #[test]
-fn an_asset_is_drawn_by_whom_it_was_asked_of_and_by_the_cpu_when_the_device_goes() {
+fn an_asset_is_drawn_by_the_chosen_backend_and_by_the_cpu_if_the_device_is_lost() {
     if renderer().is_none() {
         return;
     }
@@ -364,13 +365,13 @@ fn an_asset_is_drawn_by_whom_it_was_asked_of_and_by_the_cpu_when_the_device_goes
     assert_eq!(lenient.render(&camera, &options()).unwrap(), expected);
     let choice = lenient.choice();
     assert!(choice.backend == Backend::Cpu && choice.why.contains("was lost"), "{choice}");
-    // Whoever comes next gets a new device.
+    // The next caller gets a new device.
     let next = AssetRenderer::new(gaussians, Backend::Gpu).unwrap();
     assert_close("next", &next.render(&camera, &options()).unwrap(), &expected, 1e-6, 2e-5);
 }
 
 #[test]
-fn a_refinement_on_the_device_is_as_good_and_gives_the_same_bytes_again() {
+fn a_refinement_on_the_device_is_as_good_and_reproducible() {
     if renderer().is_none() {
         return;
     }
@@ -391,9 +392,9 @@ fn a_refinement_on_the_device_is_as_good_and_gives_the_same_bytes_again() {
     assert!(run(Backend::Gpu).gaussians == run(Backend::Gpu).gaussians);
 }
 
-/// Says in a process of its own what a device, or its absence, comes to: for the test below.
+/// Prints, in a process of its own for the test below, the result with the present device or without one.
 #[test]
-fn what_there_is() {
+fn alone_print_the_device_and_the_choice() {
     if std::env::var_os(ASKED).is_none() {
         return;
     }
@@ -411,7 +412,7 @@ fn what_there_is() {
 const ASKED: &str = "VG_TEST_WHAT_THERE_IS";
 
 #[test]
-fn drivers_that_are_missing_or_broken_are_errors_or_the_cpu_with_a_note_and_print_nothing() {
+fn missing_and_broken_drivers_are_errors_or_the_cpu_with_a_reason_and_print_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let file = |name: &str, text: &str| {
         let path = folder.path().join(name);
@@ -431,14 +432,14 @@ fn drivers_that_are_missing_or_broken_are_errors_or_the_cpu_with_a_note_and_prin
     ];
     let ask = |variables: &[(&str, &str)]| {
         let mut command = Command::new(std::env::current_exe().unwrap());
-        command.args(["what_there_is", "--exact", "--nocapture"]).env(ASKED, "1");
-        // Mesa's layer that looks for display servers prints where there is none: docs/GPU.md.
+        command.args(["alone_print_the_device_and_the_choice", "--exact", "--nocapture"]).env(ASKED, "1");
+        // Mesa's layer that looks for display servers prints a line if there is none: docs/GPU.md.
         command.env("NODEVICE_SELECT", "1");
         let out = command.envs(variables.iter().copied()).output().unwrap();
-        let said = String::from_utf8(out.stdout).unwrap();
-        assert!(out.status.success(), "{variables:?}: {said}{}", String::from_utf8_lossy(&out.stderr));
+        let printed = String::from_utf8(out.stdout).unwrap();
+        assert!(out.status.success(), "{variables:?}: {printed}{}", String::from_utf8_lossy(&out.stderr));
         assert_eq!(String::from_utf8(out.stderr).unwrap(), "", "{variables:?}");
-        let lines = said.lines().filter_map(|line| line.strip_prefix("> ")).map(str::to_owned);
+        let lines = printed.lines().filter_map(|line| line.strip_prefix("> ")).map(str::to_owned);
         let [device, auto] = lines.collect::<Vec<_>>().try_into().unwrap();
         println!("{variables:?}: {device}; {auto}");
         (device, auto)
@@ -461,7 +462,7 @@ fn drivers_that_are_missing_or_broken_are_errors_or_the_cpu_with_a_note_and_prin
 }
 
 #[test]
-fn hardware_alone_is_hardware() {
+fn a_hardware_adapter_is_not_a_software_driver() {
     match GpuRenderer::new(Adapter::Hardware) {
         Ok(gpu) => assert!(!gpu.is_software(), "{}", gpu.name()),
         Err(e) => assert!(e.to_string().starts_with("graphics processor: n"), "{e}"),

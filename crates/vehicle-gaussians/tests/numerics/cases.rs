@@ -1,4 +1,4 @@
-//! Scenes that strain a renderer (method section 8), each with what is promised of its picture and gradients.
+//! Stiff scenes for a renderer (method section 8), each with the bounds of its picture and gradients.
 
 use glam::{DMat3, DVec3, Mat3, Vec3};
 use vg::geometry::camera::Intrinsics;
@@ -7,39 +7,40 @@ use vg::render::{Background, RenderOptions};
 use vg::{Camera, Gaussians, Pose};
 use vg_testing::scenes::{looking_at_origin, random};
 
-/// A scene, and how far its picture and gradients may be from the f64 reference's.
-pub(crate) struct Case {
+/// A scene, and the bounds of the error of its picture and gradients against the f64 reference.
+pub struct Case {
     pub condition: &'static str,
-    /// What happens.
+    /// The behaviour, for the document.
     pub contract: &'static str,
     pub gaussians: Gaussians,
     pub camera: Camera,
     pub options: RenderOptions,
-    /// Whether anything is to be seen.
+    /// Whether anything is drawn.
     pub drawn: bool,
-    /// Bound of colour (of the largest, at least 1) and alpha.
+    /// Bound of colour (relative to the largest, at least 1) and alpha.
     pub picture: f64,
-    /// Bound of depth, of itself.
+    /// Bound of depth, relative to itself.
     pub depth: f64,
-    /// Bound of each gradient, of the largest in its tensor.
+    /// Bound of each gradient, relative to the largest in its tensor.
     pub gradient: f64,
-    /// Whether the loss looks at depth.
+    /// Whether the loss depends on depth.
     pub depth_in_loss: bool,
-    /// Step of the central differences: well below what the picture changes over.
+    /// Step of the central differences: well below the scale on which the picture changes.
     pub step: f64,
 }
 
-/// The smallest tensor that central differences can tell to [`DIFFERENCES`], times their step: a loss of about a hundred
-/// rounds by 2e-14.
-pub(crate) const RESOLUTION: f64 = 2e-9;
-/// f32 sums of tens of layers.
-pub(crate) const PICTURE: f64 = 5e-6;
-/// The mean of depths by weights that sum up to what they are divided by: f32 sums of tens of layers, again.
-pub(crate) const DEPTH: f64 = 3e-6;
-/// f32 sums over hundreds of pixels. Expected depth has the last word: its f32 step (5e-7 m at 5 m) over an alpha of 1/255.
-pub(crate) const GRADIENT: f64 = 1e-4;
-/// Central differences of fourth order in f64, over sums that cancel.
-pub(crate) const DIFFERENCES: f64 = 1e-5;
+/// The smallest tensor that central differences resolve to [`DIFFERENCES`], times their step: a loss of about a hundred
+/// is rounded by 2e-14.
+pub const RESOLUTION: f64 = 2e-9;
+/// Error of f32 sums of tens of layers.
+pub const PICTURE: f64 = 5e-6;
+/// Error of a mean of depths whose weights sum to the divisor: again f32 sums of tens of layers.
+pub const DEPTH: f64 = 3e-6;
+/// Error of f32 sums over hundreds of pixels; the largest is that of expected depth: its f32 step (5e-7 m at 5 m) over
+/// an alpha of 1/255.
+pub const GRADIENT: f64 = 1e-4;
+/// Error of central differences of fourth order in f64, over sums that cancel.
+pub const DIFFERENCES: f64 = 1e-5;
 
 const UNIT: [f32; 4] = [1.0, 0.0, 0.0, 0.0];
 const TURNED: [f32; 4] = [0.8, 0.2, -0.4, 0.4];
@@ -89,7 +90,7 @@ pub(crate) fn grey(each: &[Shape]) -> Gaussians {
     .unwrap()
 }
 
-/// The same Gaussians, their arrays changed.
+/// Copies Gaussians with their arrays changed.
 fn rebuilt(
     g: &Gaussians,
     change: impl Fn(&mut Vec<[f32; 3]>, &mut Vec<[f32; 4]>, &mut Vec<f32>),
@@ -100,7 +101,7 @@ fn rebuilt(
     Gaussians::from_arrays(g.sh_degree(), means, rotations, scales, opacities, sh).unwrap()
 }
 
-/// From a head's raw channels, a row of pixels 0.3 m apart.
+/// Gaussians from a head's raw channels, a row of pixels 0.3 m apart.
 fn activated(raws: &[[f32; CHANNELS]]) -> Gaussians {
     let all: Vec<Activated> = raws
         .iter()
@@ -141,10 +142,15 @@ fn shapes() -> Vec<Case> {
     ]);
     let side = looking_at_origin(48, 36, DVec3::new(0.4, -1.0, 0.3), 7.0);
     vec![
-        case("1e-10 m beside 3 m in one Gaussian", "drawn as a needle or a disc", needles.clone(), camera),
+        case("1e-10 m and 3 m in one Gaussian", "drawn as a needle or a disc", needles.clone(), camera),
         Case {
             options: RenderOptions { antialiased: true, ..options() },
-            ..case("the same, antialiased", "drawn, its opacity compensated", needles, camera)
+            ..case(
+                "1e-10 m and 3 m in one Gaussian, antialiased",
+                "drawn, its opacity compensated",
+                needles,
+                camera,
+            )
         },
         case("1e-8 m to 3 m in one scene", "drawn", random(21, 120, 1, [1e-8, 3.0]), side),
         case(
@@ -188,21 +194,21 @@ fn cameras() -> Vec<Case> {
         let camera = looking_at_origin(48, 36, towards, 7.0);
         Camera { intrinsics: Intrinsics { fx: focal, fy: focal, ..camera.intrinsics }, ..camera }
     };
-    // Seen through a telescope, pixels are micrometres: the tip of one disc is the whole picture.
+    // Through a telescope, pixels are micrometres: the tip of one disc fills the picture.
     let close = grey(&[
         ([5.0, 0.0, 0.0], TURNED, [0.02, 0.03, 1e-3], 0.8),
         ([6.0, 1e-5, 0.0], TURNED, [1e-5; 3], 0.7),
     ]);
     let telescope = |focal: f64| forward(48, 36, focal);
-    let of_size = |width: u32, height: u32| looking_at_origin(width, height, towards, 7.0);
-    // 1 m is a whole number of f32 steps at 2^20 m: what is moved there stays what it is.
+    let sized = |width: u32, height: u32| looking_at_origin(width, height, towards, 7.0);
+    // 1 m is a whole number of f32 steps at 2^20 m, so moving the scene there rounds nothing.
     let offset = DVec3::new(1_048_576.0, -1_048_576.0, 0.0);
     let moved = rebuilt(&scene, |means, _, _| {
         for m in means {
             *m = [m[0] + offset.x as f32, m[1] + offset.y as f32, m[2]];
         }
     });
-    let mut far = of_size(48, 36);
+    let mut far = sized(48, 36);
     far.vehicle_from_camera.translation += offset;
     let distant = looking_at_origin(48, 36, towards, 1e6);
     let distant = Camera { intrinsics: Intrinsics { fx: 7e6, fy: 7e6, ..distant.intrinsics }, ..distant };
@@ -221,9 +227,9 @@ fn cameras() -> Vec<Case> {
                 telescope(1e9),
             )
         },
-        case("picture of 1x1", "drawn", scene.clone(), of_size(1, 1)),
-        Case { step: 1e-8, ..case("picture of 8192x4", "drawn", scene.clone(), of_size(8192, 4)) },
-        case("picture of 4x8192", "drawn", scene.clone(), of_size(4, 8192)),
+        case("picture of 1x1", "drawn", scene.clone(), sized(1, 1)),
+        Case { step: 1e-8, ..case("picture of 8192x4", "drawn", scene.clone(), sized(8192, 4)) },
+        case("picture of 4x8192", "drawn", scene.clone(), sized(4, 8192)),
         Case {
             // The view matrix turns the scene about an origin 1.5e6 m away, where this is eight steps of f64.
             step: 2f64.powi(-30),
@@ -243,7 +249,7 @@ fn cameras() -> Vec<Case> {
             gradient: 1.0,
             step: 1e-4,
             ..case(
-                "the same, with a loss on depth",
+                "seen from 1e6 m through a telescope, with a loss on depth",
                 "drawn; gradients of expected depth are as coarse as depth's f32 step, 6 cm",
                 scene,
                 distant,
@@ -262,7 +268,7 @@ fn places() -> Vec<Case> {
     };
     vec![
         case(
-            "around the camera's centre, before it",
+            "around the camera's centre, in front of it",
             "drawn, flat, as splatting does",
             one(0.1, [1.0, 0.5, 0.2]),
             camera,
@@ -275,7 +281,7 @@ fn places() -> Vec<Case> {
         },
         not_drawn("behind the camera", one(-5.0, [0.2, 0.1, 0.05])),
         case(
-            "beside the picture, reaching into it",
+            "outside the picture, reaching into it",
             "drawn, its projection clamped to 15 % beyond",
             grey(&[([2.0, 2.0, 0.1], TURNED, [0.5, 0.4, 0.2], 0.8)]),
             camera,
@@ -337,7 +343,7 @@ fn crowds() -> Vec<Case> {
             forward(48, 36, 40.0),
         ),
         case(
-            "a scene thrice in one place",
+            "a scene three times in one place",
             "drawn in the order of storage",
             thrice(&random(25, 60, 1, [0.02, 0.3])),
             side,

@@ -1,4 +1,4 @@
-//! Writes docs/NUMERICS.md from the tables of the tests, and holds it to them.
+//! Writes docs/NUMERICS.md from the tables of the tests, and checks that it equals them.
 
 use crate::cases::{self, Case};
 use crate::inputs;
@@ -7,21 +7,21 @@ use crate::properties;
 use crate::refinement::{self, Outcome};
 use std::fmt::Write;
 
-/// Figures of another processor: its multiply-add or its exp round otherwise.
+/// Factor between figures of different processors, whose multiply-add or exp rounds differently.
 const ANOTHER_PROCESSOR: f64 = 8.0;
-/// Errors below this are rounding, whatever they are.
+/// Errors below this are rounding noise and count as equal.
 const ROUNDING: f64 = 2e-7;
 
 const HEAD: &str = "\
-# Numbers at their limits
+# Behaviour at numerical limits
 
-What happens on stiff and extreme input: an error that names the argument, or a finite result whose distance from the f64
-reference (`render::Reference`) is bounded. Written by `tests/numerics`, whose tests hold each row to its bound and this page to
-the rows:
+Behaviour on stiff and extreme input: either an error that names the argument, or a finite result with a bounded distance from
+the f64 reference (`render::Reference`). This page is written by `tests/numerics`, whose tests check each row against its bound
+and this page against the rows:
 
 ```text
 VG_BLESS=1 cargo test --test numerics      writes this page
-cargo test --test numerics                 fails where it says anything else, times aside
+cargo test --test numerics                 fails if it differs, except in times
 ```
 
 ";
@@ -29,47 +29,47 @@ cargo test --test numerics                 fails where it says anything else, ti
 const SCENES: &str = "\
 ## Pictures and gradients
 
-`CpuRenderer` (f32) against the reference (f64): largest error / root mean square. Colour is in units of the picture's largest
-colour (at least 1), depth of itself (expected depth). Gradients are of a loss that is noise on all planes: the largest error of
-any entry, in units of the largest in its tensor, and which tensor that is; then the f64 gradients against central differences
-of the f64 picture with its cuts held, 14 variables. Times are of one picture with its gradients in the test build, all tests
-running beside: they tell which case is slow, `RENDERER.md` tells how fast the renderer is.
+`CpuRenderer` (f32) against the reference (f64): largest error / root mean square. Colour is relative to the largest colour of
+the picture (at least 1), depth is relative to itself (expected depth). Gradients are those of a loss with random weights on all
+planes: the largest error of any entry, relative to the largest entry of its tensor, and the name of that tensor; then the same
+for the f64 gradients against central differences of the f64 picture with its cuts held, 14 variables. Times are for one picture
+with its gradients in the test build, with all tests running in parallel: they show which case is slow. `RENDERER.md` has the
+speed of the renderer.
 
 ";
 
 const LIMITS: &str = "\n\
 Limits of the tests: colour and alpha 5e-6, depth 3e-6 of itself (f32 sums of tens of layers), gradients 1e-4 (f32 sums over
-hundreds of pixels; expected depth divides depth's f32 step, 5e-7 m at 5 m, by an alpha of down to 1/255), central differences
-1e-5 (fourth order in f64) of tensors that are large enough for them. The veil's gradients may be off by 1e-3: the f32 step at
-8 m is 1e-6 m, 2e-4 of its alpha. So may those of the stack of 1e5 (its picture 1e-4, its depth 1e-5): T is a product of up to
-1,800 rounded factors there. From 1e6 m the vehicle is 70 steps of f32 deep, and gradients of a loss on expected depth mean
-little: place such a camera nearer, or ask for no depth.
+hundreds of pixels; expected depth divides the f32 step of depth, 5e-7 m at 5 m, by an alpha of down to 1/255), central
+differences 1e-5 (fourth order in f64) for tensors that are large enough. The limit for the gradients of the veil is 1e-3: the
+f32 step at 8 m is 1e-6 m, 2e-4 of its alpha. It is also 1e-3 for the stack of 1e5 (picture 1e-4, depth 1e-5), where T is a
+product of up to 1,800 rounded factors. From 1e6 m the vehicle is 70 steps of f32 deep, and gradients of a loss on expected
+depth have little meaning: place such a camera nearer, or use no depth.
 
 ";
 
 const INPUTS: &str = "\
-## Input that is not about the renderer
+## Other input
 
-The call that is made and what it answers. Errors are in their own words.
+The call, and its result or the text of its error.
 
 ";
 
 const REFINEMENT: &str = "\
 ## Refinement
 
-40 steps planned on an ellipsoid of 4.4 x 1.8 x 1.4 m with four photographs of 48x36, depth given; `a model` goes through
-`vg::refine::model` instead, against the same photographs. All results are finite, and
-none is worse in its own photographs than what it began with: where no step was better, `kept` is 0 and the beginning is given
-back.
+40 steps are planned on an ellipsoid of 4.4 x 1.8 x 1.4 m with four photographs of 48x36, depth given; rows that begin with
+`a model` call `vg::refine::model` instead, with the same photographs. All results are finite, and no result is worse in its own
+photographs than the initial model: if no step was better, `kept` is 0 and the initial model is returned.
 
 ";
 
 const PROPERTIES: &str = "\
-## What holds for every scene
+## Properties of every scene
 
-Tried on random scenes (`proptest`, fixed seeds; `PROPTEST_RNG_SEED` and `PROPTEST_CASES` choose others and more). A tolerance
-is of colour, in units of the picture's largest, and of alpha; two pixels of a thousand, at least one, may lie on a cut
-(alpha < 1/255, T <= 1e-4) and differ by 1e-2.
+Tested on random scenes (`proptest`, fixed seeds; `PROPTEST_RNG_SEED` and `PROPTEST_CASES` choose others and more). A tolerance
+applies to colour, relative to the largest of the picture, and to alpha. Two pixels of a thousand, and at least one, may lie on
+a cut (alpha < 1/255, T <= 1e-4) and differ by 1e-2.
 
 ";
 
@@ -78,14 +78,14 @@ const TAIL: &str = include_str!("tail.md");
 fn page() -> String {
     let mut out = String::from(HEAD);
     out.push_str(SCENES);
-    out.push_str("| condition | what happens | colour | alpha | depth | gradient | f64 gradient | ms |\n");
+    out.push_str("| condition | behaviour | colour | alpha | depth | gradient | f64 gradient | ms |\n");
     out.push_str("| --- | --- | --- | --- | --- | --- | --- | --- |\n");
     for (case, figures) in cases::all().iter().zip(measure::all()) {
         scene_row(&mut out, case, figures);
     }
     out.push_str(LIMITS);
     out.push_str(INPUTS);
-    out.push_str("| condition | call | answer |\n| --- | --- | --- |\n");
+    out.push_str("| condition | call | result |\n| --- | --- | --- |\n");
     for input in inputs::all() {
         let answer = match input.outcome() {
             Ok(words) => words,
@@ -101,9 +101,9 @@ fn page() -> String {
     {
         let why = match done.stop {
             vg::refine::Stop::Done => "all steps made",
-            vg::refine::Stop::Diverged => "diverged: loss above 3 times the first",
-            vg::refine::Stop::HeldOut => "the view held out got no better",
-            vg::refine::Stop::Unseen => "no view sees anything of it",
+            vg::refine::Stop::Diverged => "diverged: loss above 3 times the initial one",
+            vg::refine::Stop::HeldOut => "the held-out view did not improve",
+            vg::refine::Stop::Unseen => "no view sees any of it",
         };
         let [before, after] = done.psnr_db;
         let _ = writeln!(
@@ -144,7 +144,7 @@ fn scene_row(out: &mut String, case: &Case, f: &Figures) {
     );
 }
 
-/// Whether two pages say the same: words as they are, figures within what processors differ by, no times.
+/// Whether two pages are equal: words exactly, figures within the difference between processors, times ignored.
 fn same(found: &str, stored: &str) -> Result<(), String> {
     let (found, stored): (Vec<&str>, Vec<&str>) = (found.lines().collect(), stored.lines().collect());
     let mut timed = false;
@@ -154,7 +154,7 @@ fn same(found: &str, stored: &str) -> Result<(), String> {
         let cells = |line: &str| line.split('|').map(str::to_owned).collect::<Vec<String>>();
         let (mut a, mut b) = (cells(found), cells(stored));
         if timed && a.len() == b.len() && a.len() > 2 {
-            // The time, and what follows the last bar.
+            // The time, and the text after the last bar.
             a.truncate(a.len() - 2);
             b.truncate(b.len() - 2);
         }
@@ -169,8 +169,8 @@ fn same(found: &str, stored: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Cells of figures (`3e-7 / 2e-8 means`, `31.4`) within tolerance, all others letter by letter. The tensor that is
-/// worst is not compared: a tie may go either way.
+/// Compares cells of figures (`3e-7 / 2e-8 means`, `31.4`) within tolerance, all others exactly. The name of the worst
+/// tensor is not compared: a tie may go either way.
 fn same_cell(a: &str, b: &str, measured: bool) -> bool {
     if a == b {
         return true;
@@ -192,7 +192,7 @@ fn same_cell(a: &str, b: &str, measured: bool) -> bool {
 }
 
 #[test]
-fn docs_numerics_says_what_the_tests_find() {
+fn docs_numerics_equals_the_results_of_the_tests() {
     let path = vg_testing::root().join("docs/NUMERICS.md");
     let found = page();
     if std::env::var_os("VG_BLESS").is_some() {
@@ -201,12 +201,14 @@ fn docs_numerics_says_what_the_tests_find() {
     }
     let stored = std::fs::read_to_string(&path).unwrap();
     if let Err(difference) = same(&found, &stored) {
-        panic!("docs/NUMERICS.md is not what was found; VG_BLESS=1 writes it\n{difference}");
+        panic!(
+            "docs/NUMERICS.md differs from the results of the tests; VG_BLESS=1 rewrites it\n{difference}"
+        );
     }
 }
 
 #[test]
-fn the_page_is_compared_by_its_words_and_figures_and_not_by_its_times() {
+fn pages_are_compared_by_words_and_figures_but_not_by_times() {
     let table = |row: &str| format!("| a | error | ms |\n| --- | --- | --- |\n{row}\nend\n");
     let stored = table("| x | 3e-7 / 1e-7 means | 12 |");
     for (row, equal) in [

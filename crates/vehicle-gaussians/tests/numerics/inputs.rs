@@ -1,5 +1,4 @@
-//! Input that is not about the renderer: the call that is made, and either an error that names the argument or a finite
-//! result.
+//! Calls with extreme input other than scenes: each gives an error that names the argument, or a finite result.
 
 use crate::cases::{forward, grey};
 use glam::{DMat3, DVec3};
@@ -15,7 +14,7 @@ use vg::{Camera, Gaussians, Pose, Result, Scene};
 use vg_testing::scenes::{looking_at_origin, random};
 use vg_testing::vehicle::{camera, right_side, view};
 
-/// What a call promises.
+/// The promise of a call.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Contract {
     /// An error that begins with the argument's name.
@@ -25,18 +24,18 @@ pub(crate) enum Contract {
 }
 use Contract::{Finite, Refused};
 
-/// A call, and what it answers.
-pub(crate) struct Input {
+/// A call, and its promise.
+pub struct Input {
     pub condition: &'static str,
     pub call: &'static str,
     pub contract: Contract,
-    /// The result in words.
+    /// Returns the result in words.
     run: fn() -> Result<String>,
 }
 
 impl Input {
-    /// The words of the error, or of the result.
-    pub(crate) fn outcome(&self) -> Result<String, String> {
+    /// Text of the error, or of the result.
+    pub fn outcome(&self) -> Result<String, String> {
         (self.run)().map_err(|e| e.to_string())
     }
 }
@@ -57,31 +56,31 @@ fn numbers() -> Vec<Input> {
             condition: "a quaternion of norm 0",
             call: from_arrays,
             contract: Refused("rotations[0]"),
-            run: || of_one([1.0; 3], [0.0; 4], [0.1; 3], 0.5).map(in_words),
+            run: || single([1.0; 3], [0.0; 4], [0.1; 3], 0.5).map(in_words),
         },
         Input {
             condition: "a quaternion of norm 1e-45, f32's smallest",
             call: from_arrays,
             contract: Finite,
-            run: || of_one([1.0; 3], [f32::from_bits(1), 0.0, 0.0, 0.0], [0.1; 3], 0.5).map(in_words),
+            run: || single([1.0; 3], [f32::from_bits(1), 0.0, 0.0, 0.0], [0.1; 3], 0.5).map(in_words),
         },
         Input {
             condition: "a standard deviation of 0",
             call: from_arrays,
             contract: Refused("scales[0]"),
-            run: || of_one([1.0; 3], [1.0, 0.0, 0.0, 0.0], [0.1, 0.0, 0.1], 0.5).map(in_words),
+            run: || single([1.0; 3], [1.0, 0.0, 0.0, 0.0], [0.1, 0.0, 0.1], 0.5).map(in_words),
         },
         Input {
             condition: "an opacity of 1 + 2^-23",
             call: from_arrays,
             contract: Refused("opacities[0]"),
-            run: || of_one([1.0; 3], [1.0, 0.0, 0.0, 0.0], [0.1; 3], 1.0f32.next_up()).map(in_words),
+            run: || single([1.0; 3], [1.0, 0.0, 0.0, 0.0], [0.1; 3], 1.0f32.next_up()).map(in_words),
         },
         Input {
             condition: "a mean that is NaN",
             call: from_arrays,
             contract: Refused("means[0]"),
-            run: || of_one([f32::NAN, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.1; 3], 0.5).map(in_words),
+            run: || single([f32::NAN, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.1; 3], 0.5).map(in_words),
         },
         Input {
             condition: "focal length 0",
@@ -223,13 +222,13 @@ fn frames() -> Vec<Input> {
             run: || moved(Similarity { scale: -1.0, ..Similarity::IDENTITY }),
         },
         Input {
-            condition: "a scene 1e-6 of its size",
+            condition: "a scene scaled by 1e-6",
             call: "reconstruct, prior given",
             contract: Finite,
             run: || scaled_scene(1e-6),
         },
         Input {
-            condition: "a scene 1e6 of its size",
+            condition: "a scene scaled by 1e6",
             call: "reconstruct, prior given",
             contract: Refused("head"),
             run: || scaled_scene(1e6),
@@ -246,7 +245,7 @@ fn pixels() -> Vec<Input> {
             run: || {
                 let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 0.0, 1e9, 2.5];
                 let map = DepthMap::new(7, 1, odd.to_vec())?;
-                Ok(format!("no measurement but the last: {:?}", map.depth()))
+                Ok(format!("only the last is a measurement: {:?}", map.depth()))
             },
         },
         Input {
@@ -311,31 +310,46 @@ fn pixels() -> Vec<Input> {
 }
 
 fn views() -> Vec<Input> {
-    fn of(azimuths: &[f64], keep: Keep) -> Result<String> {
+    fn from_azimuths(azimuths: &[f64], keep: Keep) -> Result<String> {
         let views = azimuths.iter().map(|a| view(&format!("{a}"), camera(*a, 6.5, 48, 36))).collect();
         summed_up(&run(&Scene { views, ..Scene::default() }, &Options { keep, ..options() })?)
     }
     let call = "reconstruct";
     vec![
-        Input { condition: "no views", call, contract: Refused("views"), run: || of(&[], Keep::default()) },
-        Input { condition: "one view", call, contract: Finite, run: || of(&[-75.0], Keep::default()) },
+        Input {
+            condition: "no views",
+            call,
+            contract: Refused("views"),
+            run: || from_azimuths(&[], Keep::default()),
+        },
+        Input {
+            condition: "one view",
+            call,
+            contract: Finite,
+            run: || from_azimuths(&[-75.0], Keep::default()),
+        },
         Input {
             condition: "64 views",
             call,
             contract: Finite,
-            run: || of(&(0..64).map(|i| -170.0 + 2.5 * f64::from(i)).collect::<Vec<_>>(), Keep::default()),
+            run: || {
+                from_azimuths(
+                    &(0..64).map(|i| -170.0 + 2.5 * f64::from(i)).collect::<Vec<_>>(),
+                    Keep::default(),
+                )
+            },
         },
         Input {
             condition: "the same view twice",
             call,
             contract: Finite,
-            run: || of(&[-75.0, -75.0], Keep::default()),
+            run: || from_azimuths(&[-75.0, -75.0], Keep::default()),
         },
         Input {
             condition: "the same view twice, both kept",
             call,
             contract: Finite,
-            run: || of(&[-75.0, -75.0], Keep { duplicate_views: true, ..Keep::default() }),
+            run: || from_azimuths(&[-75.0, -75.0], Keep { duplicate_views: true, ..Keep::default() }),
         },
     ]
 }
@@ -344,7 +358,7 @@ fn largest(m: DMat3) -> f64 {
     m.to_cols_array().iter().fold(0.0, |worst, v| v.abs().max(worst))
 }
 
-fn of_one(mean: [f32; 3], rotation: [f32; 4], scale: [f32; 3], opacity: f32) -> Result<Gaussians> {
+fn single(mean: [f32; 3], rotation: [f32; 4], scale: [f32; 3], opacity: f32) -> Result<Gaussians> {
     Gaussians::from_arrays(0, vec![mean], vec![rotation], vec![scale], vec![opacity], vec![0.0; 3])
 }
 
@@ -359,7 +373,7 @@ fn assert_finite(g: &Gaussians) {
     assert!(arrays.iter().all(|a| a.iter().all(|v| v.is_finite())));
 }
 
-#[allow(clippy::needless_pass_by_value)] // what `Result::map` hands over
+#[allow(clippy::needless_pass_by_value)] // passed to `Result::map`
 fn in_words(g: Gaussians) -> String {
     assert_finite(&g);
     match g.len() {
@@ -376,7 +390,7 @@ fn drawn(camera: &Camera) -> Result<String> {
     CpuRenderer::new().render(&g, camera, &RenderOptions::default()).map(|_| "drawn".to_owned())
 }
 
-/// World placement is a pose in f64: what comes back is the camera to the rounding of 6.4e6 m in f64.
+/// World placement is a pose in f64: the camera is recovered to the rounding of 6.4e6 m in f64.
 fn placed_in_the_world() -> Result<String> {
     let gaussians = random(32, 500, 1, [0.01, 0.1]);
     let camera = looking_at_origin(96, 72, DVec3::new(0.4, -1.0, 0.3), 7.0);
@@ -412,7 +426,7 @@ fn run(scene: &Scene, options: &Options) -> Result<Reconstruction> {
 fn summed_up(made: &Reconstruction) -> Result<String> {
     assert_finite(&made.gaussians);
     let report = &made.report;
-    // Pixels are counted on edges, where rounding decides; those without a measurement are not.
+    // Counts of pixels on edges depend on rounding; counts of pixels without a measurement do not.
     let counted = |l: &&LeftOut| l.what == "views" || l.why == "no depth measured";
     let left: Vec<String> = report
         .left_out
@@ -443,7 +457,7 @@ fn scaled_scene(factor: f32) -> Result<String> {
 }
 
 #[test]
-fn every_input_is_refused_by_its_name_or_gives_a_finite_result() {
+fn every_input_gives_an_error_that_names_it_or_a_finite_result() {
     let mut failures = Vec::new();
     for input in all() {
         let outcome = input.outcome();

@@ -1,4 +1,4 @@
-//! A scene's picture and gradients in f32 against f64, and the f64 gradients against central differences.
+//! Measures a scene's picture and gradients in f32 against f64, and the f64 gradients against central differences.
 
 use crate::cases::{self, Case, DIFFERENCES, RESOLUTION};
 use std::sync::OnceLock;
@@ -7,39 +7,39 @@ use vg::render::reference::Parameters;
 use vg::render::{CpuRenderer, PictureGradient, Reference};
 use vg_testing::Random;
 use vg_testing::gradients::{
-    all_finite, difference, largest, largest_of, noise, of_variable, sampled, tensors,
+    all_finite, difference, gradient_entry, largest, largest_of, noise, sampled, tensors,
 };
 use vg_testing::is_finite;
 
-/// Largest error and root of the mean square.
+/// Largest and root mean square error.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Error {
     pub max: f64,
     pub rms: f64,
 }
 
-/// What was found of a case.
+/// Results for a case.
 #[derive(Clone, Debug)]
 pub(crate) struct Figures {
     pub finite: bool,
     pub drawn: bool,
-    /// Of the largest colour, at least 1.
+    /// Relative to the largest colour, at least 1.
     pub color: Error,
     pub alpha: Error,
-    /// Of the depth itself.
+    /// Relative to the depth itself.
     pub depth: Error,
-    /// Of the largest in its tensor, over all tensors; and which.
+    /// Relative to the largest entry of its tensor, over all tensors; and the name of the worst tensor.
     pub gradient: (f64, &'static str),
-    /// Of the f64 gradient against central differences, likewise.
+    /// Error of the f64 gradient against central differences, in the same form.
     pub differences: (f64, &'static str),
-    /// Of a picture with its gradients, f32.
+    /// Time of a picture with its gradients, f32.
     pub ms: f64,
 }
 
 fn error(found: impl Iterator<Item = f64>) -> Error {
     let (mut max, mut squares, mut n) = (0.0f64, 0.0, 0);
     for e in found {
-        // NaN stays.
+        // Keeps NaN.
         max = if e.abs() > max || e.is_nan() { e.abs() } else { max };
         squares += e * e;
         n += 1;
@@ -47,8 +47,8 @@ fn error(found: impl Iterator<Item = f64>) -> Error {
     Error { max, rms: (squares / f64::from(n)).sqrt() }
 }
 
-/// Of every case, measured once.
-pub(crate) fn all() -> &'static [Figures] {
+/// Results for every case, measured once.
+pub fn all() -> &'static [Figures] {
     static FIGURES: OnceLock<Vec<Figures>> = OnceLock::new();
     FIGURES.get_or_init(|| cases::all().iter().map(measure).collect())
 }
@@ -69,7 +69,7 @@ fn measure(case: &Case) -> Figures {
     let colors = picture.color.as_flattened().iter().zip(exact.color.as_flattened());
     let alphas = picture.alpha.iter().zip(&exact.alpha);
     let depths = picture.depth.iter().zip(&exact.depth);
-    let of_itself = |(a, e): (&f32, &f64)| if *e == 0.0 { f64::from(*a) } else { f64::from(*a) / e - 1.0 };
+    let relative = |(a, e): (&f32, &f64)| if *e == 0.0 { f64::from(*a) } else { f64::from(*a) / e - 1.0 };
 
     let of_exact = Reference.backward_f64(gaussians, camera, options, &gradient).unwrap();
     let mut worst = (0.0, "-");
@@ -84,14 +84,14 @@ fn measure(case: &Case) -> Figures {
         drawn: picture.alpha.iter().any(|a| *a > 0.0),
         color: error(colors.map(|(a, e)| (f64::from(*a) - e) / scale)),
         alpha: error(alphas.map(|(a, e)| f64::from(*a) - e)),
-        depth: error(depths.map(of_itself)),
+        depth: error(depths.map(relative)),
         gradient: worst,
         differences: differences(case),
         ms,
     }
 }
 
-/// Gradient of the loss: noise on the planes that it looks at.
+/// Gradient of the loss: random weights on the planes that it depends on.
 fn weights(case: &Case) -> PictureGradient {
     let mut out = noise(1, &case.camera);
     if !case.depth_in_loss {
@@ -108,12 +108,12 @@ fn differences(case: &Case) -> (f64, &'static str) {
     let p = Parameters::new(gaussians, camera, options).unwrap();
     let cuts = Reference.cuts(&p, options);
     let mut worst = (0.0, "-");
-    // Half as many where each costs a second.
+    // Half as many if each takes a second.
     let variables = if gaussians.len() < 100_000 { 14 } else { 7 };
     for (tensor, v) in sampled(&mut Random::new(7), gaussians).into_iter().take(variables) {
         let scale = largest_of(&g, tensor);
         let found = difference(&p, v, options, &cuts, &gradient, *step);
-        let error = (found - of_variable(&g, v)).abs();
+        let error = (found - gradient_entry(&g, v)).abs();
         let relative = error / scale.max(RESOLUTION / step);
         worst = if relative > worst.0 { (relative, tensor) } else { worst };
     }
@@ -121,7 +121,7 @@ fn differences(case: &Case) -> (f64, &'static str) {
 }
 
 #[test]
-fn every_stiff_scene_is_finite_and_as_near_to_f64_as_is_promised() {
+fn every_stiff_scene_is_finite_and_within_its_bound_of_f64() {
     let mut failures = Vec::new();
     for (case, f) in cases::all().iter().zip(all()) {
         println!("{:45} {f:?}", case.condition);

@@ -1,4 +1,4 @@
-//! What holds for every scene, tried on random ones. Seeds are fixed, so that the same scenes are tried everywhere;
+//! Properties of every scene, tested on random ones. Seeds are fixed, so that every machine tests the same scenes;
 //! `PROPTEST_RNG_SEED` and `PROPTEST_CASES` choose others and more.
 
 use glam::{DMat3, DQuat, DVec3};
@@ -14,53 +14,56 @@ use vg::{Camera, Gaussians, Pose};
 use vg_testing::gradients::{all_finite, noise};
 use vg_testing::is_finite;
 
-/// A promise, how closely it is kept, and why not more closely.
-pub(crate) struct Property {
+/// A promise, its tolerance, and the reason for the tolerance.
+pub struct Property {
     pub claim: &'static str,
-    /// Of colour (of the largest, at least 1) and alpha, away from the cuts; `None`: bit for bit, or not a number at all.
+    /// Bound of colour (relative to the largest, at least 1) and alpha, away from the cuts; `None`: bit for bit, or no
+    /// number.
     pub tolerance: Option<f64>,
     pub why: &'static str,
 }
 
-pub(crate) const AGREES: Property = Property {
-    claim: "the f32 picture is the f64 picture",
+pub const AGREES: Property = Property {
+    claim: "the f32 picture equals the f64 picture",
     tolerance: Some(2e-6),
     why: "f32 sums of up to 24 layers, centres to 2^-25 px",
 };
-pub(crate) const TWICE: Property =
-    Property { claim: "mirrored twice is what it was", tolerance: None, why: "only signs change" };
-pub(crate) const FLIPPED: Property = Property {
-    claim: "the mirrored scene from the mirrored camera is the flipped picture",
+pub const TWICE: Property =
+    Property { claim: "mirroring twice returns the same bytes", tolerance: None, why: "only signs change" };
+pub const FLIPPED: Property = Property {
+    claim: "the mirrored scene from the mirrored camera gives the flipped picture",
     tolerance: Some(2e-6),
-    why: "u and width - u round apart",
+    why: "u and width - u are rounded differently",
 };
-pub(crate) const MOVED: Property = Property {
-    claim: "scene and camera moved together show the same",
+pub const MOVED: Property = Property {
+    claim: "scene and camera moved together give the same picture",
     tolerance: Some(1e-4),
     why: "means stored in f32 move by up to 1e-6 m at 16 m, quaternions by 6e-8: 1e-4 px on needles of 2 m",
 };
-pub(crate) const PERMUTED: Property = Property {
-    claim: "the order of storage does not show, equal depths aside",
+pub const PERMUTED: Property = Property {
+    claim: "the order of storage does not change the picture, except at equal depths",
     tolerance: None,
-    why: "depths are sorted, and every sum follows them",
+    why: "depths are sorted, and every sum is in that order",
 };
 pub(crate) const FINITE: Property = Property {
     claim: "finite input of any size gives finite pictures and gradients",
     tolerance: None,
-    why: "an overflow saturates, or the argument is refused by its name",
+    why: "an overflow saturates, or an error names the argument",
 };
-pub(crate) const REFUSED: Property = Property {
-    claim: "a number that is not finite is refused by its name, in a depth map it is no measurement",
+pub const REFUSED: Property = Property {
+    claim: "a number that is not finite gives an error that names it; in a depth map it means no measurement",
     tolerance: None,
-    why: "it is looked for at every entry",
+    why: "every entry is checked",
 };
 
 /// In the order of the document.
 pub(crate) const ALL: [&Property; 7] = [&AGREES, &TWICE, &FLIPPED, &MOVED, &PERMUTED, &FINITE, &REFUSED];
 
-/// A pixel on a cut may fall to either side: alpha of 1/255 drawn or not, or a last layer of at most T = 1e-4 / (1 - 0.99).
+/// A pixel on a cut may fall to either side: alpha of 1/255 drawn or not, or a last layer of at most T = 1e-4 / (1 -
+/// 0.99).
 const FLIP: f64 = 1e-2;
-/// Share of the pixels that may: cuts are lines in the picture, f32 differs from f64 along 1e-6 of a pixel of them.
+/// Share of pixels that may: cuts are lines in the picture, and f32 differs from f64 on a strip of 1e-6 of a pixel
+/// along them.
 const FLIPS: f64 = 2e-3;
 
 fn config(cases: u32) -> ProptestConfig {
@@ -109,7 +112,7 @@ fn scene() -> impl Strategy<Value = Gaussians> {
     vec(one(), 1..24).prop_map(|ones| gathered(&ones))
 }
 
-/// Looks past the origin from 3 to 9 m, a picture of up to 40x30.
+/// A camera that looks past the origin from 3 to 9 m, with a picture of up to 40x30.
 fn camera() -> impl Strategy<Value = Camera> {
     let direction = uniform3(-1.0f64..1.0).prop_filter("no direction", |d| d[0].abs() > 0.1);
     let size = (1u32..40, 1u32..30);
@@ -156,12 +159,12 @@ fn assert_kept(property: &Property, a: &Rendered, b: &Rendered) -> Result<(), Te
     Ok(())
 }
 
-/// Any bits that are a finite number.
+/// Any bit pattern that is a finite number.
 fn any_finite() -> impl Strategy<Value = f32> {
     any::<u32>().prop_map(f32::from_bits).prop_filter("not finite", |v| v.is_finite())
 }
 
-/// A number that is not.
+/// A number that is not finite.
 fn not_finite() -> impl Strategy<Value = f32> {
     prop_oneof![Just(f32::NAN), Just(f32::INFINITY), Just(f32::NEG_INFINITY)]
 }
@@ -170,7 +173,7 @@ proptest! {
     #![proptest_config(config(96))]
 
     #[test]
-    fn the_f32_picture_is_the_f64_picture(g in scene(), camera in camera()) {
+    fn the_f32_picture_equals_the_f64_picture(g in scene(), camera in camera()) {
         let exact = Reference.render(&g, &camera, &options()).unwrap();
         for renderer in [CpuRenderer::new(), CpuRenderer::portable()] {
             assert_kept(&AGREES, &renderer.render(&g, &camera, &options()).unwrap(), &exact)?;
@@ -178,7 +181,7 @@ proptest! {
     }
 
     #[test]
-    fn the_mirrored_scene_from_the_mirrored_camera_is_the_flipped_picture(g in scene(), camera in camera()) {
+    fn the_mirrored_scene_from_the_mirrored_camera_gives_the_flipped_picture(g in scene(), camera in camera()) {
         let mut mirrored = camera;
         mirrored.vehicle_from_camera = camera.vehicle_from_camera.mirrored();
         mirrored.intrinsics.cx = f64::from(camera.width) - camera.intrinsics.cx;
@@ -192,7 +195,7 @@ proptest! {
     }
 
     #[test]
-    fn scene_and_camera_moved_together_show_the_same(
+    fn scene_and_camera_moved_together_give_the_same_picture(
         g in scene(),
         camera in camera(),
         turn in uniform4(-1.0f64..1.0).prop_filter("too short", |q| q.iter().any(|v| v.abs() > 0.1)),
@@ -206,12 +209,12 @@ proptest! {
     }
 
     #[test]
-    fn the_order_of_storage_does_not_show(
+    fn the_order_of_storage_does_not_change_the_picture(
         ones in vec(one(), 1..24),
         order in any::<[u8; 24]>(),
         jitter in vec(0.0f32..0.05, 24),
     ) {
-        // Along the optical axis 0.1 m apart, so that no two depths are equal.
+        // 0.1 m apart along the optical axis, so that no two depths are equal.
         let mut ones = ones;
         for (i, one) in ones.iter_mut().enumerate() {
             one.0[0] = 2.0 + 0.1 * i as f32 + jitter[i];
@@ -225,7 +228,7 @@ proptest! {
     }
 
     #[test]
-    fn mirrored_twice_is_what_it_was(
+    fn mirroring_twice_returns_the_same_bytes(
         means in vec(uniform3(any_finite()), 1..8),
         rotations in vec(uniform4(any_finite()), 8),
         sh in vec(any_finite(), 8 * 48),
@@ -236,7 +239,7 @@ proptest! {
         let whole: Vec<[f32; 4]> = rotations[..n].iter().map(|q| if q.iter().all(|v| *v == 0.0) { [1.0; 4] } else { *q }).collect();
         let g = Gaussians::from_arrays(degree, means, whole, vec![[0.1; 3]; n], vec![0.5; n], sh[..n * stride].to_vec()).unwrap();
         let twice = g.mirrored().mirrored();
-        // As bits: 0 and -0 differ.
+        // Compared as bits, because 0 and -0 differ.
         let bits = |g: &Gaussians| -> Vec<u32> {
             let arrays = [g.means().as_flattened(), g.rotations().as_flattened(), g.scales().as_flattened(), g.opacities(), g.sh()];
             arrays.concat().iter().map(|v| v.to_bits()).collect()
@@ -263,10 +266,10 @@ proptest! {
         (width, height) in (1u32..80, 1u32..24),
         (antialiased, degree) in (any::<bool>(), 0u8..=3),
     ) {
-        // Half of them where something may be seen.
+        // About half of them in view.
         let means = means.iter().zip(&near_means).zip(is_near).map(|((far, near), is)| if is { *near } else { *far }).collect();
         let Ok(g) = Gaussians::from_arrays(2, means, rotations, scales, opacities, sh) else {
-            // Of finite numbers only a quaternion of zeros is refused.
+            // A quaternion of zeros is the only finite input that is refused.
             return Ok(());
         };
         let mut camera = crate::cases::forward(width, height, focal.clamp(1e-3, 1e9));
@@ -286,7 +289,7 @@ proptest! {
     }
 
     #[test]
-    fn a_number_that_is_not_finite_is_refused_by_its_name(
+    fn a_number_that_is_not_finite_gives_an_error_that_names_it(
         bad in not_finite(),
         (i, k) in (0usize..5, 0usize..27),
         which in 0usize..13,
@@ -317,7 +320,7 @@ proptest! {
             .and_then(|g| CpuRenderer::new().backward(&g, &camera, &options, &gradient));
         let error = answer.expect_err("refused").to_string();
         prop_assert!(error.starts_with(&name), "{error}, not {name}");
-        // In a depth map it is no measurement.
+        // In a depth map it means no measurement.
         let map = DepthMap::new(2, 1, vec![bad, 1.5]).unwrap();
         prop_assert_eq!(map.depth(), [0.0, 1.5]);
     }

@@ -1,4 +1,4 @@
-//! Stiff refinements: each stays finite, and says when it stopped and why.
+//! Stiff refinements: each result is finite, and the report contains when and why it stopped.
 
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
@@ -14,23 +14,23 @@ use vg_testing::Random;
 use vg_testing::scenes::random;
 use vg_testing::vehicle::{camera, right_side, view};
 
-/// Steps that are planned.
+/// Number of planned steps.
 const STEPS: u32 = 40;
 
-/// A refinement that no one should ask for.
-pub(crate) struct Stiff {
+/// A refinement with unreasonable input.
+pub struct Stiff {
     pub condition: &'static str,
     scene: Scene,
     rates: Rates,
     keep: Keep,
-    /// What is refined; else what the scene's reconstruction makes.
+    /// The model to refine; `None`: the reconstruction of the scene.
     model: Option<Gaussians>,
-    /// Why it ends.
+    /// The expected reason for the end.
     pub stop: Stop,
 }
 
-/// What became of it.
-pub(crate) struct Outcome {
+/// The result of a refinement.
+pub struct Outcome {
     pub gaussians: Gaussians,
     pub refinement: Refinement,
     pub ms: f64,
@@ -83,11 +83,11 @@ pub(crate) fn all() -> Vec<Stiff> {
         Stiff { stop: Stop::Diverged, ..stiff("all rates 400 times the default", times(400.0)) },
         Stiff {
             stop: Stop::Diverged,
-            ..stiff("scales thrown to their bounds, 1e-7 m and 3 m: rate 10", Rates { scales: 10.0, ..usual })
+            ..stiff("scales driven to their bounds, 1e-7 m and 3 m: rate 10", Rates { scales: 10.0, ..usual })
         },
         Stiff {
             stop: Stop::Diverged,
-            ..stiff("opacities thrown to 6e-6 and 1 - 6e-6: rate 10", Rates { opacities: 10.0, ..usual })
+            ..stiff("opacities driven to 6e-6 and 1 - 6e-6: rate 10", Rates { opacities: 10.0, ..usual })
         },
         Stiff {
             scene: twice,
@@ -95,16 +95,16 @@ pub(crate) fn all() -> Vec<Stiff> {
             ..stiff("coplanar duplicates: every view twice", usual)
         },
         Stiff { scene: from_inside(scene()), ..stiff("a camera inside the vehicle", usual) },
-        given("a model with scales of 1e-8 to 3 m, each axis any", of_all_scales()),
+        given("a model with scales of 1e-8 to 3 m, independent per axis", with_all_scales()),
         given("a model of 1e5 layers of opacity 0.005 behind one another", stacks(100_000, 0.005)),
         unseen("a model of 1e5 layers below 1/255", stacks(100_000, 0.003)),
-        given("a model of 200 Gaussians, each there ten times", ten_times(&random(5, 200, 2, [0.02, 0.3]))),
+        given("a model of 200 Gaussians, each stored ten times", ten_times(&random(5, 200, 2, [0.02, 0.3]))),
         unseen("a model 1e4 m away", far(&random(6, 200, 0, [0.02, 0.3]))),
     ]
 }
 
-/// In the vehicle's box, from smaller than any camera sees to as large as a head makes.
-fn of_all_scales() -> Gaussians {
+/// Gaussians in the vehicle's box, from smaller than any camera resolves to as large as a head makes.
+fn with_all_scales() -> Gaussians {
     let g = random(4, 2000, 1, [0.1, 0.1]);
     let mut r = Random::new(41);
     let scales =
@@ -133,8 +133,8 @@ fn far(g: &Gaussians) -> Gaussians {
     Gaussians::from_arrays(0, means, rotations, scales, g.opacities().to_vec(), g.sh().to_vec()).unwrap()
 }
 
-/// Of every case, run once.
-pub(crate) fn outcomes() -> &'static [Outcome] {
+/// Results of every case, run once.
+pub fn outcomes() -> &'static [Outcome] {
     static OUTCOMES: OnceLock<Vec<Outcome>> = OnceLock::new();
     OUTCOMES.get_or_init(|| all().iter().map(Stiff::run).collect())
 }
@@ -169,7 +169,7 @@ impl Stiff {
 }
 
 #[test]
-fn stiff_refinements_stay_finite_and_say_why_they_stopped() {
+fn stiff_refinements_stay_finite_and_report_why_they_stopped() {
     for (stiff, Outcome { gaussians: g, refinement: done, .. }) in all().iter().zip(outcomes()) {
         println!("{:60} {done:?}", stiff.condition);
         let arrays = [
@@ -186,10 +186,10 @@ fn stiff_refinements_stay_finite_and_say_why_they_stopped() {
             stiff.condition
         );
         assert_eq!(done.stop, stiff.stop, "{}", stiff.condition);
-        // Divergence is seen at a look, of which there are 20 or one a round.
+        // Divergence is detected at a check, of which there are 20 or one per round.
         let early = matches!(done.stop, Stop::Diverged | Stop::Unseen);
         assert!(if early { done.made < STEPS } else { done.made == STEPS }, "{done:?}");
-        // What got no better is given back as it was.
+        // A result that did not improve is returned as it was.
         assert!(done.psnr_db[1] >= done.psnr_db[0], "{}: {done:?}", stiff.condition);
     }
 }

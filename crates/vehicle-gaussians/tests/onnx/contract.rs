@@ -1,11 +1,11 @@
-//! Models that break a contract: each is refused with words that say where and what is allowed.
+//! Models that break a contract: the error of each names the place and the allowed values.
 
 use std::ops::ControlFlow;
 use vg::onnx::Model;
 use vg::pipeline::{Calibrate, Options, PriorChoice, reconstruct};
 use vg::{Error, Scene};
 use vg_testing::networks::graph::{Graph, INT64, Port};
-use vg_testing::networks::oracle::{Manner, ellipsoid, says};
+use vg_testing::networks::oracle::{Manner, ellipsoid, set_output};
 use vg_testing::networks::{file, open, opened};
 use vg_testing::vehicle::right_side;
 
@@ -31,7 +31,7 @@ fn refusal(scene: &Scene, model: &Model) -> String {
 }
 
 #[test]
-fn each_break_is_named() {
+fn each_violation_is_named() {
     let scene = right_side(WIDTH, HEIGHT);
     let graph = sound(&scene);
     let Some(model) = open("sound", &graph) else { return };
@@ -106,7 +106,7 @@ fn each_break_is_named() {
         ),
         ("output missing", Box::new(|g| g.outputs.retain(|p| p.name != "depth")), "output depth: missing"),
         (
-            "no metres and no cameras",
+            "no metric scale and no cameras",
             Box::new(|g| {
                 g.say("vg.metric", "false");
                 g.outputs.retain(|p| p.name != "cam_to_ref_pred");
@@ -115,35 +115,35 @@ fn each_break_is_named() {
         ),
         (
             "NaN",
-            Box::new(|g| says(g, "depth", f32::NAN)),
+            Box::new(|g| set_output(g, "depth", f32::NAN)),
             "output depth: the network returned NaN; allowed: finite",
         ),
         (
             "infinite",
-            Box::new(|g| says(g, "confidence", f32::INFINITY)),
+            Box::new(|g| set_output(g, "confidence", f32::INFINITY)),
             "output confidence: the network returned inf",
         ),
         (
             "negative",
-            Box::new(|g| says(g, "depth", -2.0)),
+            Box::new(|g| set_output(g, "depth", -2.0)),
             "output depth: the network returned -2; allowed: above 0",
         ),
         (
             "short rays",
-            Box::new(|g| says(g, "rays", 0.5)),
+            Box::new(|g| set_output(g, "rays", 0.5)),
             "output rays: the network returned a ray of length 0.866",
         ),
         (
             "mask of 2",
-            Box::new(|g| says(g, "mask", 2.0)),
+            Box::new(|g| set_output(g, "mask", 2.0)),
             "output mask: the network returned 2; allowed: 0 to 1",
         ),
         (
             "scale 0",
-            Box::new(|g| says(g, "scale", 0.0)),
+            Box::new(|g| set_output(g, "scale", 0.0)),
             "output scale: the network returned 0; allowed: above 0",
         ),
-        ("no rotation", Box::new(|g| says(g, "cam_to_ref_pred", 1.0)), "output cam_to_ref_pred[0]: "),
+        ("no rotation", Box::new(|g| set_output(g, "cam_to_ref_pred", 1.0)), "output cam_to_ref_pred[0]: "),
         (
             "five views",
             Box::new(|g| g.inputs.iter_mut().for_each(|p| p.dimensions[0] = Some(5))),
@@ -156,17 +156,17 @@ fn each_break_is_named() {
         break_it(&mut broken);
         let path = file(name);
         broken.write(&path);
-        // The runtime itself may find it first; then its words name the model.
-        let said = match opened(&path).unwrap() {
+        // If the runtime itself finds the fault first, its message names the model.
+        let message = match opened(&path).unwrap() {
             Ok(model) => refusal(&scene, &model),
             Err(error) => error.to_string(),
         };
-        assert!(said.starts_with(expected), "{name}:\n  {said}\n  {expected}");
+        assert!(message.starts_with(expected), "{name}:\n  {message}\n  {expected}");
     }
 }
 
 #[test]
-fn what_the_runtime_itself_refuses_names_the_file_in_one_line() {
+fn errors_of_the_runtime_name_the_file_in_one_line() {
     let scene = right_side(WIDTH, HEIGHT);
     let mut graph = sound(&scene);
     if open("probe", &graph).is_none() {

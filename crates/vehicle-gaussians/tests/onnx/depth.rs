@@ -1,4 +1,4 @@
-//! The geometry prior on graphs that know the vehicle.
+//! The geometry prior on graphs that contain the exact vehicle.
 
 use glam::{DMat3, DVec3};
 use std::ops::ControlFlow;
@@ -34,8 +34,8 @@ fn estimate(scene: &Scene, model: &Model) -> Result<Geometry> {
     NetworkPrior::new(model.clone())?.estimate(&scene.views, &context)
 }
 
-/// Relative errors in rising order, two pixels inside the silhouette, where f32 still tells where a ray meets the ball;
-/// of pixels with depth.
+/// Relative errors in increasing order, of pixels with depth at least two pixels inside the silhouette, where f32 still
+/// resolves the intersection of the ray with the ellipsoid.
 fn relative_errors(scene: &Scene, geometry: &Geometry) -> Vec<f64> {
     let mut errors = Vec::new();
     for (view, depth) in scene.views.iter().zip(&geometry.depths) {
@@ -55,7 +55,7 @@ fn relative_errors(scene: &Scene, geometry: &Geometry) -> Vec<f64> {
     errors
 }
 
-/// The largest of them, and how many there are.
+/// The largest of them, and their number.
 fn worst(scene: &Scene, geometry: &Geometry) -> (f64, usize) {
     let errors = relative_errors(scene, geometry);
     (*errors.last().unwrap(), errors.len())
@@ -81,11 +81,11 @@ fn depth_is_exact_in_every_convention() {
         let geometry = estimate(&scene, &model).unwrap();
         let (error, count) = worst(&scene, &geometry);
         assert!(error < 1e-4 && count > 1000, "{manner:?}: {error:.1e} at {count} pixels");
-        let told = geometry.network.unwrap();
-        assert!(told.ray_degrees.unwrap() < 1e-2 && told.warnings.is_empty(), "{told:?}");
-        assert_eq!(told.rescaled, !is_metric);
-        assert_eq!((told.prior.as_str(), told.size), ("oracle", [WIDTH, HEIGHT]));
-        let poses = told.poses.unwrap();
+        let network = geometry.network.unwrap();
+        assert!(network.ray_degrees.unwrap() < 1e-2 && network.warnings.is_empty(), "{network:?}");
+        assert_eq!(network.rescaled, !is_metric);
+        assert_eq!((network.prior.as_str(), network.size), ("oracle", [WIDTH, HEIGHT]));
+        let poses = network.poses.unwrap();
         let expected = if is_metric { 1.0 } else { f64::from(unit) };
         assert!((poses.scale / expected - 1.0).abs() < 1e-5, "{poses:?}");
         assert!(poses.rotation_degrees.iter().all(|d| *d < 0.05) && poses.center_m.iter().all(|m| *m < 1e-4));
@@ -93,18 +93,18 @@ fn depth_is_exact_in_every_convention() {
 }
 
 #[test]
-fn pictures_are_scaled_and_cut_with_their_intrinsics_and_depth_comes_back_to_their_pixels() {
-    // So near that the vehicle fills the picture's width.
+fn pictures_are_scaled_and_cropped_with_their_intrinsics_and_depth_is_resampled_to_their_pixels() {
+    // So close that the vehicle fills the width of the picture.
     let views = [-80.0, -100.0].map(|a| view(&format!("{a}"), camera(a, 4.2, 128, 72)));
     let scene = Scene { views: views.into(), ..Scene::default() };
     for (resize, cut) in [("cover_crop", true), ("stretch", false)] {
-        // Of another aspect than the photographs.
+        // Another aspect ratio than that of the photographs.
         let mut graph = ellipsoid(&scene.views[0].camera, 88, 66, Manner::PLAIN);
         graph.say("vg.resize", resize);
         let Some(model) = open(resize, &graph) else { return };
         let geometry = estimate(&scene, &model).unwrap();
         let errors = relative_errors(&scene, &geometry);
-        // The ball bends between the network's coarser pixels.
+        // The ellipsoid is curved between the network's coarser pixels.
         let most = errors[errors.len() * 19 / 20];
         assert!(most < 2e-3 && errors.len() > 4000, "{resize}: {most:.1e} at {} pixels", errors.len());
         let mask = scene.views[0].mask.as_ref().unwrap();
@@ -131,7 +131,7 @@ fn a_whole_reconstruction_is_as_good_as_with_the_depth_itself() {
     assert_eq!(json["network"]["prior"], "oracle");
     assert_eq!(json["settings"]["prior"], "onnx");
     assert!(json["settings"]["prior_model"].as_str().unwrap().ends_with("whole.onnx"));
-    // Again, and from two threads at once: the same bytes.
+    // A second time, and from two threads at once: the same bytes.
     std::thread::scope(|scope| {
         let again: Vec<_> = (0..2).map(|_| scope.spawn(|| run(&bare, &model).unwrap().gaussians)).collect();
         for thread in again {
@@ -141,7 +141,7 @@ fn a_whole_reconstruction_is_as_good_as_with_the_depth_itself() {
 }
 
 #[test]
-fn cameras_far_from_the_origin_meet_no_f32() {
+fn cameras_far_from_the_origin_are_never_rounded_to_f32() {
     let mut scene = right_side(WIDTH, HEIGHT);
     let graph = ellipsoid(&scene.views[0].camera, WIDTH.into(), HEIGHT.into(), Manner::PLAIN);
     let Some(model) = open("far", &graph) else { return };
@@ -156,23 +156,23 @@ fn cameras_far_from_the_origin_meet_no_f32() {
 #[test]
 fn a_metric_network_that_is_off_by_a_tenth_is_corrected_by_its_own_cameras() {
     let scene = right_side(WIDTH, HEIGHT);
-    // Says metres, but means units of 1.1.
+    // A network that declares metres, but has units of 1.1 m.
     let manner = Manner { is_metric: true, unit: 1.1, along_ray: false };
     let mut graph = ellipsoid(&scene.views[0].camera, WIDTH.into(), HEIGHT.into(), manner);
-    oracle::says(&mut graph, "scale", 1.0);
+    oracle::set_output(&mut graph, "scale", 1.0);
     let Some(model) = open("tenth", &graph) else { return };
     let geometry = estimate(&scene, &model).unwrap();
     assert!(worst(&scene, &geometry).0 < 1e-4);
-    let told = geometry.network.unwrap();
-    assert!(told.rescaled && (told.poses.unwrap().scale - 1.1).abs() < 1e-4);
+    let network = geometry.network.unwrap();
+    assert!(network.rescaled && (network.poses.unwrap().scale - 1.1).abs() < 1e-4);
 }
 
 #[test]
-fn poses_of_other_pictures_are_told_and_rays_of_another_lens_refused() {
+fn poses_of_other_pictures_give_a_warning_and_rays_of_another_lens_are_refused() {
     let mut scene = right_side(WIDTH, HEIGHT);
     let graph = ellipsoid(&scene.views[0].camera, WIDTH.into(), HEIGHT.into(), Manner::PLAIN);
     let Some(right) = open("poses", &graph) else { return };
-    // A network that says poses of its own: those of a rig turned by 12 degrees at the last camera.
+    // A network with its own poses: those of a rig whose last camera is turned by 12 degrees.
     let mut turned = graph.clone();
     turned.rename_output_of("cam_to_ref_pred", "before");
     let (s, c) = 12f32.to_radians().sin_cos();
@@ -182,15 +182,15 @@ fn poses_of_other_pictures_are_told_and_rays_of_another_lens_refused() {
     }
     turned.floats("turn", &[4, 4], &matrix).node("MatMul", &["before", "turn"], "cam_to_ref_pred", &[]);
     let model = open("turned", &turned).unwrap();
-    let told = estimate(&scene, &model).unwrap().network.unwrap();
-    assert!(told.warnings.iter().any(|w| w.contains("12.0 degrees")), "{:?}", told.warnings);
+    let network = estimate(&scene, &model).unwrap().network.unwrap();
+    assert!(network.warnings.iter().any(|w| w.contains("12.0 degrees")), "{:?}", network.warnings);
 
-    // Rays of its own: constants of the right lens, while the caller's is another.
+    // A network with its own rays: constants of the right lens, while the caller's is another.
     let i = &mut scene.views[1].camera.intrinsics;
     (i.fx, i.fy) = (2.0 * i.fx, 2.0 * i.fy);
-    let told = estimate(&scene, &right).unwrap().network.unwrap();
-    // The oracle takes what it is told: rays agree, views do not.
-    assert!(told.ray_degrees.unwrap() < 1e-2);
+    let network = estimate(&scene, &right).unwrap().network.unwrap();
+    // The test graph uses the given intrinsics: rays agree, views do not.
+    assert!(network.ray_degrees.unwrap() < 1e-2);
     let mut fixed = graph;
     let rays: Vec<f32> = (0..HEIGHT * WIDTH)
         .flat_map(|p| {
@@ -221,12 +221,12 @@ fn a_network_without_metres_needs_two_places() {
     let text = estimate(&one, &model).unwrap_err().to_string();
     assert!(text.contains("the vehicle's size cannot be determined"), "{text}");
     let graph = ellipsoid(&one.views[0].camera, WIDTH.into(), HEIGHT.into(), Manner::PLAIN);
-    let told = estimate(&one, &open("metric one", &graph).unwrap()).unwrap().network.unwrap();
-    assert!(told.warnings.iter().any(|w| w.contains("the network's own scale")), "{:?}", told.warnings);
+    let network = estimate(&one, &open("metric one", &graph).unwrap()).unwrap().network.unwrap();
+    assert!(network.warnings.iter().any(|w| w.contains("the network's own scale")), "{:?}", network.warnings);
 }
 
 #[test]
-fn a_view_that_is_out_of_scale_is_brought_to_the_others() {
+fn a_view_with_another_scale_is_scaled_to_the_others() {
     let scene = right_side(WIDTH, HEIGHT);
     let mut graph = ellipsoid(&scene.views[0].camera, WIDTH.into(), HEIGHT.into(), Manner::PLAIN);
     graph.rename_output_of("depth", "before");
@@ -238,8 +238,8 @@ fn a_view_that_is_out_of_scale_is_brought_to_the_others() {
 }
 
 #[test]
-fn identity_is_what_the_first_camera_gets() {
-    // The oracle would be off by its first pose otherwise; a rotation of all the world changes nothing.
+fn the_first_camera_gets_the_identity() {
+    // Otherwise the test graph would be off by its first pose; a rotation of the whole world changes nothing.
     let mut scene = right_side(WIDTH, HEIGHT);
     let graph = ellipsoid(&scene.views[0].camera, WIDTH.into(), HEIGHT.into(), Manner::PLAIN);
     let Some(model) = open("turned world", &graph) else { return };

@@ -1,4 +1,4 @@
-//! The Gaussian head on graphs whose attributes are known.
+//! The Gaussian head on graphs with known attributes.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -30,7 +30,7 @@ fn run(scene: &Scene, options: &Options) -> vg::Result<vg::pipeline::Reconstruct
 
 #[test]
 fn attributes_become_gaussians_at_the_lifted_points() {
-    // Sides that are no multiples of 32.
+    // Sides that are not multiples of 32.
     let scene = right_side(50, 37);
     let Some(model) = open("constant", &constant("32", -5.0)) else { return };
     let made = run(&scene, &options(&model)).unwrap();
@@ -69,16 +69,16 @@ fn heads_that_break_the_contract_are_named() {
         let mut broken = graph.clone();
         break_it(&mut broken);
         let model = open(&format!("head{k}"), &broken).unwrap();
-        let said = match run(&scene, &options(&model)) {
+        let message = match run(&scene, &options(&model)) {
             Ok(_) => "accepted".into(),
             Err(Error::Format { field, reason, .. }) => format!("{field}: {reason}"),
             Err(other) => other.to_string(),
         };
-        assert!(said.starts_with(expected), "{said}\n{expected}");
+        assert!(message.starts_with(expected), "{message}\n{expected}");
     }
 }
 
-/// `tests/data/head`, as `training/head/parity.py` writes it: views, depth, and what PyTorch makes of some pixels.
+/// `tests/data/head`, written by `training/head/parity.py`: views, depth, and PyTorch's results for some pixels.
 struct Fixture {
     scene: Scene,
     every: usize,
@@ -130,12 +130,12 @@ fn folder() -> PathBuf {
 }
 
 #[test]
-fn gaussians_are_those_of_the_network_that_was_exported() {
+fn gaussians_equal_those_of_the_exported_network() {
     let Some(model) = opened(&folder().join("tiny_head.onnx")) else { return };
     let head = NetworkHead::new(model.unwrap(), 2).unwrap();
     let Fixture { scene, every, gaussians } = fixture();
     let pixels = scene.views[0].image.pixels().len();
-    // Only the pixels that the fixture has, so that Gaussians and rows go side by side.
+    // Only the pixels of the fixture, so that Gaussians correspond to rows.
     let kept: Vec<Vec<bool>> = scene
         .views
         .iter()

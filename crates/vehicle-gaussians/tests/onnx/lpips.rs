@@ -1,4 +1,4 @@
-//! Picture distances from a network: on a graph whose answer is known, and against the lpips package where Python has
+//! Picture distances from a network: on a graph with a known answer, and compared with the lpips package if Python has
 //! it.
 
 use std::process::Command;
@@ -44,7 +44,7 @@ fn tiny(sides: Option<[u64; 2]>) -> Graph {
 
 const WEIGHTS: [f32; 4] = [0.5, 1.0, 0.25, 2.0];
 
-/// What the graph computes, in f64.
+/// The distance that the graph computes, in f64.
 fn expected(a: &[[f32; 3]], b: &[[f32; 3]]) -> f64 {
     let unit = |p: &[f32; 3]| {
         let rgb = p.map(|c| 2.0 * f64::from(c) - 1.0);
@@ -59,7 +59,7 @@ fn expected(a: &[[f32; 3]], b: &[[f32; 3]]) -> f64 {
     a.iter().zip(b).map(pixel).sum::<f64>() / a.len() as f64
 }
 
-/// A picture, and one that differs from it a little.
+/// A picture, and one that differs slightly from it.
 fn pictures(width: u32, height: u32) -> [Vec<[f32; 3]>; 2] {
     let mut random = Random::new(u64::from(width));
     let mut a = Vec::new();
@@ -72,11 +72,11 @@ fn pictures(width: u32, height: u32) -> [Vec<[f32; 3]>; 2] {
     [a, b]
 }
 
-/// f32 sums of four numbers and of all pixels.
+/// Error of f32 sums of four numbers and of all pixels.
 const TOLERANCE: f64 = 2e-6;
 
 #[test]
-fn the_distance_is_what_the_graph_computes_of_both_pictures() {
+fn the_distance_equals_the_result_of_the_graph() {
     let Some(model) = open("lpips", &tiny(None)) else { return };
     let lpips = Lpips::new(model).unwrap();
     assert_eq!(lpips.net(), "tiny");
@@ -85,7 +85,7 @@ fn the_distance_is_what_the_graph_computes_of_both_pictures() {
         let found = lpips.distance(&a, &b, w, h).unwrap();
         assert!((found - expected(&a, &b)).abs() < TOLERANCE, "{found} {}", expected(&a, &b));
         assert_eq!(lpips.distance(&a, &a, w, h).unwrap(), 0.0);
-        // As a display would show them.
+        // Clamped, as on a display.
         let bright: Vec<[f32; 3]> = a.iter().map(|p| p.map(|c| if c > 0.9 { 7.0 } else { c })).collect();
         let shown: Vec<[f32; 3]> = bright.iter().map(|p| p.map(|c| c.min(1.0))).collect();
         assert_eq!(lpips.distance(&bright, &b, w, h).unwrap(), lpips.distance(&shown, &b, w, h).unwrap());
@@ -100,15 +100,15 @@ fn pictures_that_cannot_be_measured_are_named() {
     let (any, fixed) = (Lpips::new(any).unwrap(), Lpips::new(fixed).unwrap());
     let [a, b] = pictures(80, 64);
     assert!(fixed.distance(&a, &b, 80, 64).unwrap() > 0.0);
-    let said =
+    let message =
         |lpips: &Lpips, a: &[[f32; 3]], w: u32, h: u32| lpips.distance(a, &b, w, h).unwrap_err().to_string();
-    assert_eq!(said(&any, &a, 63, 64), "width: 63; allowed: 64 or more");
-    assert_eq!(said(&any, &a, 80, 10), "height: 10; allowed: 64 or more");
-    assert_eq!(said(&any, &a[1..], 80, 64), "a: 5119 pixels; allowed: width * height = 5120");
-    assert_eq!(said(&fixed, &a, 64, 80), "width: 64; allowed: 80, the model's fixed size");
+    assert_eq!(message(&any, &a, 63, 64), "width: 63; allowed: 64 or more");
+    assert_eq!(message(&any, &a, 80, 10), "height: 10; allowed: 64 or more");
+    assert_eq!(message(&any, &a[1..], 80, 64), "a: 5119 pixels; allowed: width * height = 5120");
+    assert_eq!(message(&fixed, &a, 64, 80), "width: 64; allowed: 80, the model's fixed size");
     let mut broken = a.clone();
     broken[7][1] = f32::NAN;
-    assert!(said(&any, &broken, 80, 64).starts_with("a[7]: ["));
+    assert!(message(&any, &broken, 80, 64).starts_with("a[7]: ["));
 }
 
 #[test]
@@ -154,16 +154,16 @@ fn picture_distances_that_break_the_contract_are_named() {
         let path = file(&format!("lpips{k}"));
         broken.write(&path);
         let model = opened(&path).unwrap();
-        let said = match model.and_then(Lpips::new).and_then(|lpips| lpips.distance(&a, &b, 64, 64)) {
+        let message = match model.and_then(Lpips::new).and_then(|lpips| lpips.distance(&a, &b, 64, 64)) {
             Ok(_) => "accepted".into(),
             Err(Error::Format { field, reason, .. }) => format!("{field}: {reason}"),
             Err(other) => other.to_string(),
         };
-        assert!(said.contains(expected), "{said}\n{expected}");
+        assert!(message.contains(expected), "{message}\n{expected}");
     }
 }
 
-/// The exporter's file and the package's own answers for the same pictures, with a random backbone.
+/// Script that writes the exporter's file and the package's own answers for the same pictures, with a random backbone.
 const PACKAGE: &str = r#"
 import sys, types, warnings
 from pathlib import Path
@@ -191,7 +191,7 @@ for w, h in [(64, 64), (97, 75), (512, 384)]:
 const PACKAGE_TOLERANCE: f64 = 1e-7;
 
 #[test]
-fn distances_are_those_of_the_lpips_package() {
+fn distances_equal_those_of_the_lpips_package() {
     let package = vg_testing::root().join("bindings/python/python/vehicle_gaussians");
     let present =
         Command::new("python3").args(["-c", "import torch, lpips, torchvision, onnx, onnxscript"]).output();

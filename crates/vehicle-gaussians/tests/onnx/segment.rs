@@ -1,4 +1,4 @@
-//! Masks from segmentation networks, on graphs whose answers are known: bright pixels are vehicle.
+//! Masks from segmentation networks, on graphs with known answers: bright pixels are vehicle.
 
 use vg::onnx::Model;
 use vg::scene::mask::Label;
@@ -11,7 +11,7 @@ use vg_testing::vehicle::right_side;
 const WIDTH: u32 = 96;
 const HEIGHT: u32 = 72;
 
-/// Pixels in both over pixels in either.
+/// Intersection over union of two masks.
 fn overlap(a: &Mask, b: &Mask) -> f64 {
     let count = |test: &dyn Fn(bool, bool) -> bool| {
         let vehicle = |l: &Label| *l == Label::Vehicle;
@@ -25,9 +25,9 @@ fn segmenter(name: &str, graph: &Graph) -> Option<Segmenter> {
 }
 
 #[test]
-fn the_mask_comes_back_at_the_photographs_size_without_the_car_beside() {
+fn the_mask_has_the_photographs_size_and_excludes_the_neighbouring_car() {
     let scene = right_side(WIDTH, HEIGHT);
-    // The network's pictures: as large, smaller and of another shape, and of any size.
+    // The network's picture size: equal, smaller and of another shape, and free.
     let sizes = [Some((96, 72)), Some((64, 64)), None];
     for (k, (size, least)) in sizes.into_iter().zip([1.0, 0.93, 0.93]).enumerate() {
         let Some(network) = segmenter(&format!("segment{k}"), &brightness(size)) else { return };
@@ -96,12 +96,12 @@ fn segmentations_that_break_the_contract_are_named() {
             Ok(model) => Segmenter::new(model),
             Err(error) => Err(error),
         };
-        let said = match model.and_then(|network| network.mask(&view.image, &view.camera)) {
+        let message = match model.and_then(|network| network.mask(&view.image, &view.camera)) {
             Ok(_) => "accepted".into(),
             Err(Error::Format { field, reason, .. }) => format!("{field}: {reason}"),
             Err(other) => other.to_string(),
         };
-        assert!(said.contains(expected), "{said}\n{expected}");
+        assert!(message.contains(expected), "{message}\n{expected}");
     }
     let network = segmenter("size", &graph).unwrap();
     let other = Camera { width: 97, ..view.camera };

@@ -15,7 +15,7 @@ fn centers() -> serde_json::Map<String, serde_json::Value> {
     cameras.map(|c| (c.name, serde_json::json!(c.camera.center().to_array()))).collect()
 }
 
-/// The sample's surface: what its depth maps show of the right side, and its mirror image.
+/// The sample's surface: the points of its depth maps of the right side, and their mirror image.
 pub(crate) fn write_scan(path: &Path) {
     let scene = vg::io::open_scene(&sample(), &vg::io::SceneOptions::default()).unwrap().scene;
     let mut points = Vec::new();
@@ -31,7 +31,7 @@ pub(crate) fn write_scan(path: &Path) {
     vg::io::ply::write_points(path, &points, &grey).unwrap();
 }
 
-/// Scale error, and how far the vehicle's corners end from where they belong, metres.
+/// Scale error, and largest shift of the vehicle's corners, metres.
 fn errors(path: &Path) -> (f64, f64) {
     let found = vg::io::read_vehicle_from_world(path).unwrap();
     let truth = truth();
@@ -43,7 +43,7 @@ fn errors(path: &Path) -> (f64, f64) {
 }
 
 #[test]
-fn a_scan_gives_the_sample_s_frame_and_says_how_well_it_fits() {
+fn a_scan_gives_the_sample_s_frame_and_prints_how_well_it_fits() {
     let folder = copy_of_sample(&["sparse", "masks", "images"]);
     let at = folder.path();
     write_scan(&at.join("scan.ply"));
@@ -56,12 +56,12 @@ fn a_scan_gives_the_sample_s_frame_and_says_how_well_it_fits() {
     let written = json(&at.join("v.json"));
     assert!(written["residual_m"].as_f64().unwrap() < 0.03 && written["confidence"].as_f64().unwrap() > 0.2);
     assert!((written["scale"].as_f64().unwrap() / truth().scale - 1.0).abs() < 0.01);
-    // The file works as --vehicle-from-world.
+    // The file serves as input of a reconstruction.
     succeed(
         at,
         "reconstruct {} --vehicle-from-world {}/v.json --views 000,001 --prior hull --no-check -o {}/a.ply",
     );
-    // A view without a mask is left out and reported.
+    // A view without a mask is left out, with a message.
     fs::remove_file(at.join("masks/007.png")).unwrap();
     let run = succeed_with_warnings(at, "align {} --scan {}/scan.ply -o {}/v.json");
     assert!(run.err.contains("007.png: no mask; searched for masks/"), "{run:?}");
@@ -70,7 +70,7 @@ fn a_scan_gives_the_sample_s_frame_and_says_how_well_it_fits() {
 }
 
 #[test]
-fn a_scan_that_does_not_serve_is_an_error_that_says_what_would() {
+fn an_unusable_scan_is_an_error_with_the_requirements() {
     let folder = copy_of_sample(&["sparse", "masks", "images"]);
     let at = folder.path();
     write_scan(&at.join("scan.ply"));
@@ -88,7 +88,7 @@ fn a_scan_that_does_not_serve_is_an_error_that_says_what_would() {
 }
 
 #[test]
-fn exactly_one_way_to_align_is_asked_for() {
+fn exactly_one_way_to_align_is_required() {
     let at = Path::new(".");
     fail(at, "align . -o v.json", 2, &["--scan", "--known-centers", "--box", "--matrix"]);
     fail(at, "align . --matrix m.txt --box 4,2,1 -o v.json", 2, &["--matrix", "--box"]);
@@ -116,7 +116,7 @@ fn a_matrix_is_checked_and_rewritten() {
 }
 
 #[test]
-fn known_centers_of_the_sample_give_its_similarity_and_small_residuals() {
+fn known_centers_of_the_sample_give_its_similarity_with_small_residuals() {
     let scene = copy_of_sample(&["sparse"]);
     let at = scene.path();
     let mut centers = centers();
@@ -128,7 +128,7 @@ fn known_centers_of_the_sample_give_its_similarity_and_small_residuals() {
     // The model's poses are written with 17 digits.
     assert!(pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 1e-9);
 
-    // One wrong centre is named and does no harm.
+    // One wrong centre is named and has no effect.
     let x = centers["003.png"][0].as_f64().unwrap();
     centers["003.png"][0] = (x + 2.0).into();
     fs::write(at.join("wrong.json"), serde_json::to_vec(&centers).unwrap()).unwrap();
@@ -152,7 +152,7 @@ fn too_few_centers_and_unknown_names_are_errors() {
     assert!(!at.join("v.json").exists());
 }
 
-/// The sample in 3DRealCar's folders, as they look after having been moved: the links in `pcd_rescale` are gone.
+/// The sample in 3DRealCar's folders, as they are after having been moved: the links in `pcd_rescale` are broken.
 fn real_car(at: &Path) {
     let processed = at.join("colmap_processed");
     copy(&sample().join("sparse"), &processed.join("pcd_rescale/sparse"));

@@ -4,7 +4,7 @@ use super::*;
 use std::fs;
 
 #[test]
-fn the_demo_leaves_model_report_renders_and_contact_sheet() {
+fn the_demo_writes_model_report_renders_and_contact_sheet() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path().join("new");
     let out = succeed(&at, "demo {}").out;
@@ -19,12 +19,12 @@ fn the_demo_leaves_model_report_renders_and_contact_sheet() {
     assert!(fs::read(at.join("asset.ply")).unwrap() == fs::read(asset()).unwrap());
     let sheet = image::open(at.join("contact.png")).unwrap();
     assert!(sheet.width() > 1000 && sheet.height() > 300);
-    // Once more over the first: everything is replaced.
+    // A second run replaces everything.
     succeed(&at, "demo {}");
 }
 
 #[test]
-fn the_sample_inside_the_program_is_the_one_in_the_repository() {
+fn the_sample_inside_the_program_equals_the_one_in_the_repository() {
     let folder = tempfile::tempdir().unwrap();
     succeed(folder.path(), "demo {}");
     let scene = folder.path().join("scene");
@@ -32,7 +32,7 @@ fn the_sample_inside_the_program_is_the_one_in_the_repository() {
     for part in ["", "images", "masks", "depth", "sparse/0"] {
         for entry in fs::read_dir(sample().join(part)).unwrap() {
             let entry = entry.unwrap();
-            // The model's text twin says the same again.
+            // The text version of the model has the same content.
             let is_twin = part == "sparse/0" && entry.path().extension().is_some_and(|e| e == "txt");
             if entry.file_type().unwrap().is_file() && !is_twin {
                 let inside = scene.join(part).join(entry.file_name());
@@ -46,7 +46,7 @@ fn the_sample_inside_the_program_is_the_one_in_the_repository() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_made_is_one_error() {
+fn a_folder_that_cannot_be_created_is_one_error() {
     let file = tempfile::NamedTempFile::new().unwrap();
     fail(file.path(), "demo {}/demo", 1, &[file.path().to_str().unwrap()]);
 }

@@ -1,4 +1,4 @@
-//! What goes wrong is one line that names the cause.
+//! Every error is one line that names the cause.
 
 use super::*;
 use std::fs;
@@ -40,7 +40,7 @@ fn a_mask_that_the_scene_names_but_lacks_is_named() {
 }
 
 #[test]
-fn an_unknown_view_is_answered_with_the_views_there_are() {
+fn an_unknown_view_is_an_error_with_the_existing_views() {
     for command in
         ["reconstruct . --views 000,side.png -o a.ply", "render {} --cameras . --views side.png -o a"]
     {
@@ -61,7 +61,7 @@ fn a_bad_box_and_a_bad_background_are_usage_errors() {
 }
 
 #[test]
-fn an_output_that_cannot_be_written_is_found_before_the_work() {
+fn an_output_that_cannot_be_written_is_an_error_before_the_work() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("file"), "").unwrap();
@@ -83,7 +83,7 @@ fn a_model_is_not_written_over_the_pictures_it_is_made_of() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_folder_that_takes_no_files_is_found_before_the_work() {
+fn a_read_only_folder_is_an_error_before_the_work() {
     fail(Path::new("."), "reconstruct . --views 000 -o /proc/a.ply", 1, &["/proc: "]);
     fail(Path::new("."), "eval . --json /proc/e.json", 1, &["/proc: "]);
 }
@@ -100,13 +100,13 @@ fn a_full_disk_is_an_error_and_not_a_panic() {
 }
 
 #[test]
-fn a_colmap_model_without_its_similarity_is_told_what_is_missing() {
+fn a_colmap_model_without_its_similarity_is_an_error_that_names_it() {
     let scene = copy_of_sample(&["sparse", "images", "masks"]);
     fail(scene.path(), "reconstruct {} -o {}/a.ply", 1, &["--vehicle-from-world FILE"]);
 }
 
 #[test]
-fn info_and_render_refuse_what_is_no_ply() {
+fn info_and_render_refuse_files_that_are_not_ply() {
     for file in ["README.md", "images/000.png", "transforms.json"] {
         fail(Path::new("."), &format!("info {file}"), 1, &[file]);
         fail(Path::new("."), &format!("render {file} --cameras . -o out"), 1, &[file]);

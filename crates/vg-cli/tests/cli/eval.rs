@@ -17,10 +17,10 @@ fn an_evaluation_prints_a_table_and_writes_the_same_numbers_as_json() {
     assert_eq!((row["verdict"].as_str(), document["mean"]["verdict"].as_str()), (Some("good"), Some("good")));
     let psnr = row["psnr_db"].as_f64().unwrap();
     assert!(lines[1].contains(&format!("{psnr:.3}")), "{out}");
-    // Far below what is reached: this guards the protocol (white background, sides, masks), not the method.
+    // Far below the actual figures: this tests the protocol (white background, sides, masks), not the method.
     assert!(psnr > 17.0 && row["silhouette_iou"].as_f64().unwrap() > 0.85, "{row}");
     assert!(row["psnr_box_db"].as_f64().unwrap() < psnr);
-    // The hull was not shown the inputs' depth, so it can be measured with it.
+    // The hull does not use the inputs' depth, so it can be measured with it.
     let depth = row["input_depth_mae_m"].as_f64().unwrap();
     assert!(depth > 0.001 && depth < 0.3, "{depth}");
     let views = row["views"].as_array().unwrap();
@@ -29,8 +29,8 @@ fn an_evaluation_prints_a_table_and_writes_the_same_numbers_as_json() {
 }
 
 #[test]
-fn the_hull_is_not_shown_depth() {
-    // Without depth files the same model comes out.
+fn the_hull_does_not_use_depth() {
+    // Without depth files the model is the same.
     let blind = copy_of_sample(&["images", "masks", "split.json", "transforms.json"]);
     let path = blind.path().join("transforms.json");
     let text = fs::read_to_string(&path).unwrap();
@@ -65,7 +65,7 @@ fn several_scenes_get_a_row_of_means() {
 }
 
 #[test]
-fn splits_that_make_no_sense_are_errors() {
+fn invalid_splits_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("list.json"), "[1]").unwrap();
@@ -84,7 +84,7 @@ fn splits_that_make_no_sense_are_errors() {
 fn a_cloud_moves_the_surface_to_it_and_is_found_in_the_scene_s_folder() {
     let folder = copy_of_sample(&["images", "masks", "depth", "split.json", "transforms.json"]);
     let at = folder.path();
-    // Every point of what the input views see, as a scan.
+    // Every point that the input views see, as a scan.
     succeed(
         at,
         &format!("reconstruct . --views {INPUTS} --prior given -o {{}}/g.ply --points {{}}/scan.ply"),
@@ -101,7 +101,7 @@ fn a_cloud_moves_the_surface_to_it_and_is_found_in_the_scene_s_folder() {
 }
 
 #[test]
-fn depth_in_the_inputs_is_shown_where_there_is_some() {
+fn the_error_of_depth_in_the_inputs_is_printed_if_they_have_depth() {
     let heading = |prior: &str| {
         let out = succeed(Path::new("."), &format!("eval . --prior {prior}")).out;
         out.lines().next().unwrap().to_owned()
@@ -111,7 +111,7 @@ fn depth_in_the_inputs_is_shown_where_there_is_some() {
 }
 
 #[test]
-fn clouds_that_make_no_sense_are_errors() {
+fn invalid_clouds_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let header = |n: usize| {
@@ -133,7 +133,7 @@ fn clouds_that_make_no_sense_are_errors() {
 }
 
 #[test]
-fn a_table_has_a_row_for_each_system_and_says_why_one_is_empty() {
+fn a_table_has_a_row_for_each_system_and_the_reason_if_one_is_empty() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let words = "eval . --table symmetry --with --prior=hull --repeat 2 --json {}/e.json --markdown {}/e.md";
@@ -143,7 +143,7 @@ fn a_table_has_a_row_for_each_system_and_says_why_one_is_empty() {
     let systems = document["systems"].as_array().unwrap();
     let of = |name: &str| systems.iter().find(|s| s["system"].as_str().unwrap().starts_with(name)).unwrap();
     let psnr = |name: &str| of(name)["psnr_db"].as_f64().unwrap();
-    // Nothing stands where the unseen side was.
+    // The unseen side is empty without clones.
     assert!(
         psnr("Gaussian cloning") > psnr("neither") + 2.0 && psnr("image flipping") > psnr("neither") + 2.0
     );
@@ -161,7 +161,7 @@ fn a_table_has_a_row_for_each_system_and_says_why_one_is_empty() {
 }
 
 #[test]
-fn the_side_table_looks_from_everywhere() {
+fn the_side_table_uses_the_test_views_of_every_split() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(
@@ -181,13 +181,13 @@ fn the_side_table_looks_from_everywhere() {
         (views(0), views(1)),
         (vec!["000.png".into(), "001.png".into()], vec!["004.png".into(), "005.png".into()])
     );
-    // Every split's test views, but those that are shown.
+    // The test views of every split, except those that are inputs.
     assert_eq!(views(2), ["000.png", "001.png"]);
     assert_eq!(systems[0]["each"][0]["split"], "l");
 }
 
 #[test]
-fn a_folder_of_vehicles_with_faults_is_measured_as_far_as_it_goes() {
+fn a_folder_with_faulty_vehicles_is_measured_as_far_as_possible() {
     let set = tempfile::tempdir().unwrap();
     let parts = ["images", "masks", "depth", "split.json", "transforms.json"];
     for name in ["a_good", "b_no_mask", "c_wrong_size", "d_empty_sparse", "e_no_picture"] {
@@ -218,7 +218,7 @@ fn a_folder_of_vehicles_with_faults_is_measured_as_far_as_it_goes() {
     assert!(run.out.contains("a_good  right_to_left") && run.out.lines().count() == 2, "{run:?}");
     assert_eq!(json(&at("e.json"))["errors"].as_array().unwrap().len(), 4);
 
-    // Several systems: a fault of the pictures is told once for a vehicle, a method's own where it is met.
+    // Several systems: a fault of the pictures is reported once per vehicle, one of a method where it occurs.
     let run = vg_in(set.path(), "eval {} --table symmetry --with --prior=hull --json {}/t.json");
     let errors = run.err.lines().filter(|line| line.starts_with("vg: error: ")).count();
     assert_eq!((run.code, errors), (1, 4), "{run:?}");
@@ -249,7 +249,7 @@ fn models_of_other_programs_are_rows() {
     let run = vg(&words);
     assert_eq!((run.code, run.err.as_str()), (0, ""), "{run:?}");
     let systems = json(&json_path)["systems"].clone();
-    // By way of a file: opacities and scales are stored as logits and logarithms.
+    // Through a file: opacities and scales are stored as logits and logarithms.
     let psnr = |i: usize| systems[i]["psnr_db"].as_f64().unwrap();
     assert!((psnr(0) - psnr(1)).abs() < 1e-3, "{} {}", psnr(0), psnr(1));
     assert_eq!(
@@ -276,7 +276,7 @@ fn models_of_other_programs_are_rows() {
 }
 
 #[test]
-fn options_for_all_rows_have_their_place() {
+fn options_for_all_rows_belong_into_with() {
     let folder = Path::new(".");
     fail(folder, "eval . --table side --prior hull", 2, &["--with"]);
     fail(folder, "eval . --with --prior=hull", 2, &["--with needs --table"]);
@@ -284,7 +284,7 @@ fn options_for_all_rows_have_their_place() {
 }
 
 #[test]
-fn a_colmap_model_is_aligned_on_the_way_and_two_possible_headings_are_an_error() {
+fn a_colmap_model_is_aligned_before_it_is_measured_and_an_ambiguous_heading_is_an_error() {
     let folder = copy_of_sample(&["images", "masks", "sparse", "split.json"]);
     let at = folder.path();
     let (model, _) = vg::io::ply::read(asset()).unwrap();
@@ -293,7 +293,7 @@ fn a_colmap_model_is_aligned_on_the_way_and_two_possible_headings_are_an_error()
         vg::io::ply::write_points(&at.join(name), points, &vec![[128; 3]; points.len()]).unwrap();
     };
     write("scan.ply", &scan);
-    // Whatever the front looks like, so does the back.
+    // A scan with equal front and back.
     let both: Vec<[f32; 3]> = scan.iter().flat_map(|&[x, y, z]| [[x, y, z], [-x, y, z]]).collect();
     write("both.ply", &both);
 

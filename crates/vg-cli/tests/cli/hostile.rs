@@ -1,8 +1,8 @@
-//! Arguments nobody should give: never a panic, always one line.
+//! Invalid arguments: never a panic, always one line.
 
 use super::*;
 
-/// What is tried, and the exit code it must give.
+/// Arguments, and the expected exit code.
 const TABLE: &[(&[&str], i32)] = &[
     (&["unknown"], 2),
     (&["--unknown"], 2),
@@ -47,7 +47,7 @@ const TABLE: &[(&[&str], i32)] = &[
 ];
 
 #[test]
-fn arguments_nobody_should_give_are_one_line_and_no_panic() {
+fn invalid_arguments_are_errors_of_one_line() {
     for (args, code) in TABLE {
         let run = vg(args);
         assert_eq!((run.code, run.out.as_str()), (*code, ""), "{args:?}: {run:?}");
@@ -57,7 +57,7 @@ fn arguments_nobody_should_give_are_one_line_and_no_panic() {
 }
 
 #[test]
-fn no_arguments_at_all_show_the_help_as_wrong_usage() {
+fn without_arguments_the_help_is_printed_as_a_usage_error() {
     let run = vg::<&str>(&[]);
     assert_eq!((run.code, run.out.as_str()), (2, ""));
     assert!(run.err.contains("Usage: vg"));
@@ -65,7 +65,7 @@ fn no_arguments_at_all_show_the_help_as_wrong_usage() {
 
 #[cfg(unix)]
 #[test]
-fn arguments_that_are_no_text_are_no_panic() {
+fn arguments_that_are_not_text_are_errors() {
     use std::os::unix::ffi::OsStrExt;
     let strange = std::ffi::OsStr::from_bytes(b"\xff\xfe.ply");
     for args in

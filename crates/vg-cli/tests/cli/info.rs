@@ -14,7 +14,7 @@ fn gaussians_are_counted_and_measured() {
 }
 
 #[test]
-fn point_clouds_are_told_from_gaussians() {
+fn point_clouds_are_distinguished_from_gaussians() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("p.ply");
     vg::io::ply::write_points(&path, &[[0.0; 3], [400.0, 0.0, 0.0]], &[[1; 3]; 2]).unwrap();
@@ -40,7 +40,7 @@ fn problems_are_listed() {
 
 #[cfg(unix)]
 #[test]
-fn a_reader_that_goes_away_is_no_error() {
+fn a_closed_pipe_is_not_an_error() {
     let mut child = Command::new(env!("CARGO_BIN_EXE_vg"))
         .args(["info", asset().to_str().unwrap()])
         .stdout(std::process::Stdio::piped())
@@ -52,11 +52,11 @@ fn a_reader_that_goes_away_is_no_error() {
     assert_eq!((done.status.code(), done.stderr.as_slice()), (Some(0), &b""[..]));
 }
 
-/// The properties of a Gaussian without those of its colour.
+/// The properties of a Gaussian except those of its colour.
 const SHAPE: [&str; 11] =
     ["x", "y", "z", "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"];
 
-/// A file of Gaussians with these float properties, all numbers `value` but the rotations, which are none.
+/// A file of Gaussians with these float properties, all of them `value` except the rotations, which are invalid.
 fn ply(path: &Path, properties: &[&str], count: usize, value: f32) {
     let mut bytes = format!("ply\nformat binary_little_endian 1.0\nelement vertex {count}\n").into_bytes();
     for name in properties {
@@ -78,7 +78,7 @@ fn ply(path: &Path, properties: &[&str], count: usize, value: f32) {
 }
 
 #[test]
-fn gaussians_that_are_not_drawn_are_named_with_the_way_out() {
+fn gaussians_that_cannot_be_drawn_are_named_with_the_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.ply");
     let dc = ["f_dc_0", "f_dc_1", "f_dc_2"];
@@ -105,7 +105,7 @@ fn gaussians_that_are_not_drawn_are_named_with_the_way_out() {
 }
 
 #[test]
-fn numbers_without_their_logarithm_and_logit_are_told() {
+fn scales_and_opacities_without_logarithm_and_logit_give_a_warning() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.ply");
     ply(&path, &[&SHAPE[..], &["f_dc_0", "f_dc_1", "f_dc_2"]].concat(), 200, 0.01);
@@ -118,7 +118,7 @@ fn numbers_without_their_logarithm_and_logit_are_told() {
 }
 
 #[test]
-fn other_formats_are_named_with_the_way_out() {
+fn other_formats_are_named_with_the_remedy() {
     let folder = tempfile::tempdir().unwrap();
     for (name, bytes, says) in [
         ("car.spz", &b"\x1f\x8b\x08\x00\x00\x00\x00\x00"[..], ["SPZ", "splat-transform"]),
@@ -156,7 +156,7 @@ fn names_of_properties_and_files_reach_standard_output_as_text() {
     assert!(run.code == 0 && run.out.lines().count() == 1, "{run:?}");
     assert!(run.out.chars().all(|c| c == '\n' || !c.is_control()), "{run:?}");
 
-    // Keys of a split, in the table, as Markdown and in JSON.
+    // Keys of a split, in the table, in Markdown and in JSON.
     let scene = copy_of_sample(&["transforms.json", "images", "masks", "depth"]);
     let split = serde_json::json!({ evil: { "input": ["000", "001"], "test": ["004"] } });
     std::fs::write(scene.path().join("split.json"), split.to_string()).unwrap();
@@ -167,12 +167,12 @@ fn names_of_properties_and_files_reach_standard_output_as_text() {
         assert!(shown.contains("RED"), "{shown}");
         assert!(shown.chars().all(|c| c == '\n' || !c.is_control() && c != '\u{202e}'), "{shown:?}");
     }
-    assert_eq!(json(&scene.path().join("e.json"))["splits"][0]["split"], evil, "the same text to a program");
+    assert_eq!(json(&scene.path().join("e.json"))["splits"][0]["split"], evil, "JSON has the original text");
 }
 
 #[cfg(unix)]
 #[test]
-fn a_model_comes_from_a_pipe_as_from_a_file() {
+fn a_model_is_read_from_a_pipe_as_from_a_file() {
     for name in ["-", "/dev/stdin"] {
         let mut child = Command::new(env!("CARGO_BIN_EXE_vg"))
             .args(["info", name])

@@ -1,4 +1,4 @@
-//! The end that comes from outside: signals, limits, and a parent that is gone.
+//! External termination: signals, limits, and the end of the parent process.
 
 use super::*;
 use std::fs;
@@ -7,7 +7,7 @@ use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 fn start(words: &str) -> Child {
-    // Tests that are run in the background hand on that INT is ignored.
+    // Tests run in the background inherit that INT is ignored.
     Command::new("env")
         .args(["--default-signal=INT,TERM,HUP", env!("CARGO_BIN_EXE_vg")])
         .args(words.split_whitespace())
@@ -39,7 +39,7 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn a_signal_leaves_no_temporary_file_and_its_number_in_the_exit_code() {
+fn a_signal_leaves_no_temporary_file_and_sets_the_exit_code() {
     let asset = asset().display();
     for (signal, code) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
         let folder = tempfile::tempdir().unwrap();
@@ -57,7 +57,7 @@ fn a_signal_leaves_no_temporary_file_and_its_number_in_the_exit_code() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_signal_that_the_parent_wants_ignored_is_ignored() {
+fn a_signal_ignored_by_the_parent_is_ignored() {
     let folder = tempfile::tempdir().unwrap();
     let words = "trap '' HUP; exec \"$0\" render \"$1\" --turntable 200 --size 64x48 -o \"$2\"";
     let mut child = Command::new("sh")
@@ -73,7 +73,7 @@ fn a_signal_that_the_parent_wants_ignored_is_ignored() {
 }
 
 #[test]
-fn a_file_beyond_the_processs_limit_is_an_error_that_tells_it() {
+fn a_file_beyond_the_limit_of_the_process_is_an_error_that_names_the_limit() {
     let folder = tempfile::tempdir().unwrap();
     let done = Command::new("sh")
         .args(["-c", "ulimit -f 16; exec \"$0\" demo \"$1\"", env!("CARGO_BIN_EXE_vg")])
@@ -91,7 +91,7 @@ fn a_file_beyond_the_processs_limit_is_an_error_that_tells_it() {
 }
 
 #[test]
-fn a_result_keeps_the_mode_of_the_file_that_it_replaces() {
+fn a_result_has_the_mode_of_the_file_that_it_replaces() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("v.json");
     fs::write(&path, "old").unwrap();
@@ -102,10 +102,10 @@ fn a_result_keeps_the_mode_of_the_file_that_it_replaces() {
 }
 
 #[test]
-fn a_process_that_measures_for_another_ends_when_that_is_gone() {
+fn a_measuring_child_ends_when_its_parent_ends() {
     let mut child = start("reconstruct . --prior hull --refine 600s -o /dev/null --end-with-input");
     std::thread::sleep(Duration::from_millis(300));
-    assert!(child.try_wait().unwrap().is_none(), "it works while its input is open");
+    assert!(child.try_wait().unwrap().is_none(), "it runs while its input is open");
     drop(child.stdin.take());
     assert_eq!(child.wait().unwrap().code(), Some(129));
 }
@@ -113,7 +113,7 @@ fn a_process_that_measures_for_another_ends_when_that_is_gone() {
 #[cfg(target_os = "linux")]
 #[test]
 fn the_child_of_a_sweep_that_is_killed_ends_too() {
-    // A point that takes long enough to be met in the middle.
+    // A point that takes long enough to be interrupted.
     let mut sweep = Command::new(env!("CARGO_BIN_EXE_vg"))
         .args(["pareto", ".", "--repeat", "1", "--point", "slow: --prior hull --refine 1s"])
         .current_dir(sample())
@@ -132,7 +132,7 @@ fn the_child_of_a_sweep_that_is_killed_ends_too() {
     sweep.wait().unwrap();
     let child = children.trim().to_owned();
     let state = || fs::read_to_string(format!("/proc/{child}/stat")).unwrap_or_default();
-    // Gone, or dead and not yet collected by whoever inherited it.
+    // Ended, or a zombie that its new parent has not collected yet.
     wait_until("the child is gone", || {
         let state = state();
         state.is_empty() || state.rsplit(')').next().is_some_and(|rest| rest.trim().starts_with('Z'))

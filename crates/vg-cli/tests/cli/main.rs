@@ -1,4 +1,4 @@
-//! The program as a user runs it: on the bundled sample, and on everything a user may get wrong.
+//! The program as a user runs it: on the bundled sample, and with every kind of error of a user.
 
 mod align;
 mod demo;
@@ -21,10 +21,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// The sample's input views; the others see the other side.
+/// The sample's input views; the others show the other side.
 const INPUTS: &str = "000,001,002,003";
 
-/// What a run left behind.
+/// Results of a run.
 #[derive(Debug)]
 struct Run {
     code: i32,
@@ -40,26 +40,26 @@ fn vg<S: AsRef<std::ffi::OsStr>>(args: &[S]) -> Run {
 fn ran(command: &mut Command) -> Run {
     let done = command.output().unwrap();
     Run {
-        code: done.status.code().expect("ended by itself"),
+        code: done.status.code().expect("an exit code"),
         out: String::from_utf8_lossy(&done.stdout).into_owned(),
         err: String::from_utf8_lossy(&done.stderr).into_owned(),
     }
 }
 
-/// Runs the program on words, `{}` standing for a folder.
+/// Runs the program with these arguments, in which `{}` stands for a folder.
 fn vg_in(folder: &Path, words: &str) -> Run {
     let folder = folder.to_str().unwrap();
     vg(&words.split_whitespace().map(|word| word.replace("{}", folder)).collect::<Vec<_>>())
 }
 
-/// As [`vg_in`], and it succeeds without a word on standard error.
+/// Runs as [`vg_in`] and asserts success without output on standard error.
 fn succeed(folder: &Path, words: &str) -> Run {
     let run = vg_in(folder, words);
     assert_eq!((run.code, run.err.as_str()), (0, ""), "vg {words}: {run:?}");
     run
 }
 
-/// As [`vg_in`], and it succeeds; all that it says on standard error are warnings.
+/// Runs as [`vg_in`] and asserts success with nothing but warnings on standard error.
 fn succeed_with_warnings(folder: &Path, words: &str) -> Run {
     let run = vg_in(folder, words);
     assert_eq!(run.code, 0, "vg {words}: {run:?}");
@@ -67,14 +67,14 @@ fn succeed_with_warnings(folder: &Path, words: &str) -> Run {
     run
 }
 
-/// As [`vg_in`], and it fails as promised: the code, nothing on standard output, and one line on standard error
-/// that says all of `causes`.
+/// Runs as [`vg_in`] and asserts failure: the exit code, nothing on standard output, and one line on standard error
+/// with all of `causes`.
 fn fail(folder: &Path, words: &str, code: i32, causes: &[&str]) {
     let run = vg_in(folder, words);
     assert_eq!((run.code, run.out.as_str()), (code, ""), "vg {words}: {run:?}");
     assert_one_error(&run);
     for cause in causes {
-        assert!(run.err.contains(cause), "vg {words}: {:?} does not say {cause:?}", run.err);
+        assert!(run.err.contains(cause), "vg {words}: {:?} lacks {cause:?}", run.err);
     }
 }
 
@@ -88,7 +88,7 @@ fn sample() -> PathBuf {
     vg_testing::root().join("tests/data/sedan")
 }
 
-/// The model of the sample's inputs by silhouettes, made once by the program.
+/// The model of the sample's inputs by the shape prior, made once by the program.
 fn asset() -> &'static Path {
     static ASSET: OnceLock<PathBuf> = OnceLock::new();
     ASSET.get_or_init(|| {
@@ -98,7 +98,7 @@ fn asset() -> &'static Path {
     })
 }
 
-/// A copy of parts of the sample to spoil.
+/// A copy of parts of the sample, for modification.
 fn copy_of_sample(parts: &[&str]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for part in parts {

@@ -14,11 +14,11 @@ fn sweep(folder: &Path, points: &[&str]) -> Run {
 }
 
 #[test]
-fn a_sweep_gives_a_table_a_plot_and_what_no_point_beats() {
+fn a_sweep_gives_a_table_a_plot_and_the_front() {
     let folder = tempfile::tempdir().unwrap();
-    let said = sweep(folder.path(), &["", "coarse, \"half\": --resolution 0.5", "--max-views 1"]);
-    assert_eq!((said.code, said.err.as_str()), (0, ""));
-    assert_eq!(said.out.lines().count(), 4, "{}", said.out);
+    let run = sweep(folder.path(), &["", "coarse, \"half\": --resolution 0.5", "--max-views 1"]);
+    assert_eq!((run.code, run.err.as_str()), (0, ""));
+    assert_eq!(run.out.lines().count(), 4, "{}", run.out);
     let rows = json(&folder.path().join("p.json"))["points"].as_array().unwrap().clone();
     let names: Vec<&str> = rows.iter().map(|r| r["system"].as_str().unwrap()).collect();
     assert_eq!(names, ["default", "coarse, \"half\"", "--max-views 1"]);
@@ -29,7 +29,7 @@ fn a_sweep_gives_a_table_a_plot_and_what_no_point_beats() {
         assert!(range[0] <= number("seconds") && number("seconds") <= range[1] && range[0] > 0.0, "{row}");
         assert!(number("input_psnr_db") > number("psnr_db") && number("input_ssim") > 0.5, "{row}");
     }
-    // A point that is better than all others is beaten by none; which one is the quickest, the machine decides.
+    // The point with the smallest error is on the front; which one is the fastest depends on the machine.
     let best =
         rows.iter().max_by(|a, b| a["psnr_db"].as_f64().unwrap().total_cmp(&b["psnr_db"].as_f64().unwrap()));
     assert_eq!(best.unwrap()["on_front"], true);
@@ -43,15 +43,15 @@ fn a_sweep_gives_a_table_a_plot_and_what_no_point_beats() {
 }
 
 #[test]
-fn a_point_that_makes_no_sense_is_named() {
+fn an_invalid_point_is_named() {
     let folder = tempfile::tempdir().unwrap();
     for (point, cause) in [
         ("fast: --no-such-thing", "--point \"fast: --no-such-thing\": unexpected argument"),
         ("--sh-degree 9", "--sh-degree"),
         ("--prior onnx", "--prior-model"),
     ] {
-        let said = sweep(folder.path(), &[point]);
-        assert!(said.code == 2 && said.out.is_empty() && said.err.contains(cause), "{said:?}");
-        assert_one_error(&said);
+        let run = sweep(folder.path(), &[point]);
+        assert!(run.code == 2 && run.out.is_empty() && run.err.contains(cause), "{run:?}");
+        assert_one_error(&run);
     }
 }

@@ -4,7 +4,7 @@ use super::*;
 use std::fs;
 
 #[test]
-fn views_are_known_by_path_by_file_name_and_by_stem() {
+fn views_are_chosen_by_path_by_file_name_and_by_stem() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let mixed = "images/000.png,001.png,002,images/003.png";
@@ -28,7 +28,7 @@ fn the_model_is_the_same_bytes_with_one_thread_and_with_two() {
 }
 
 #[test]
-fn auto_uses_depth_if_every_used_view_has_it_and_the_report_says_so() {
+fn auto_uses_depth_if_every_used_view_has_it_and_the_report_names_the_prior() {
     let folder = tempfile::tempdir().unwrap();
     let prior = |views: &str| {
         let run = succeed_with_warnings(
@@ -58,7 +58,7 @@ fn a_colmap_folder_with_its_similarity_gives_nearly_the_model_of_the_true_poses(
     let (direct, _) = vg::io::ply::read(asset()).unwrap();
     let (n, expected) = (colmap.len() as f64, direct.len() as f64);
     assert!((n - expected).abs() < 0.01 * expected, "{n} Gaussians, {expected} with the true poses");
-    // COLMAP's model is written with all digits; the grid may still fall a hair differently.
+    // COLMAP's model is written with all digits; the grid may still differ slightly.
     let (low, high) = (colmap.bounds().unwrap(), direct.bounds().unwrap());
     for k in 0..3 {
         assert!((low.0[k] - high.0[k]).abs() < 0.02 && (low.1[k] - high.1[k]).abs() < 0.02);
@@ -76,7 +76,7 @@ fn points_are_the_metric_cloud_of_the_used_views_and_keep_changes_the_model() {
     let size = json(&sample().join("vehicle.json"))["size_m"].clone();
     for k in 0..3 {
         let half = 0.5 * size[k].as_f64().unwrap() as f32;
-        // 16-bit millimetres, and the ground's contact with the tyres.
+        // Depth in 16-bit millimetres, and the ground at the tyres.
         assert!(positions.iter().all(|p| p[k].abs() < half + 0.05), "axis {k}");
     }
     succeed(at, &format!("{common} --keep all -o {{}}/all.ply --report {{}}/all.json"));
@@ -97,7 +97,7 @@ fn options_reach_the_library() {
     assert_eq!((report["sh_degree"].as_u64(), report["threads"].as_u64()), (Some(0), Some(1)));
 }
 
-/// The sample with all camera centres at a share of their distance: a vehicle of that share of its size.
+/// The sample with all camera centres scaled, which scales the vehicle by the same factor.
 fn shrunk(scale: f64) -> tempfile::TempDir {
     let scene = copy_of_sample(&["images", "masks", "transforms.json"]);
     let path = scene.path().join("transforms.json");
@@ -114,7 +114,7 @@ fn shrunk(scale: f64) -> tempfile::TempDir {
 }
 
 #[test]
-fn a_result_that_is_not_to_be_believed_is_a_warning_and_with_strict_a_failure_without_a_file() {
+fn a_bad_verdict_is_a_warning_and_with_strict_a_failure_without_a_file() {
     let scene = shrunk(0.18);
     let at = scene.path();
     let common = format!("reconstruct {{}} --views {INPUTS} --prior hull --resolution 0.5");
@@ -164,11 +164,11 @@ fn depth_scale_replaces_the_scenes_unit() {
 }
 
 #[test]
-fn a_baseline_is_fitted_and_what_it_has_not_is_refused() {
+fn a_baseline_is_fitted_and_options_that_it_lacks_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let words = format!("reconstruct . --views {INPUTS} --resolution 0.25 --baseline 3dgs");
-    // Four steps are few, and the verdict says so.
+    // Four steps are few, which the verdict shows.
     succeed_with_warnings(at, &format!("{words} --refine 4 -o {{}}/a.ply --report {{}}/r.json"));
     let report = json(&at.join("r.json"));
     assert_eq!((report["prior"].as_str(), report["head"].as_str()), (Some("none"), Some("3dgs")));

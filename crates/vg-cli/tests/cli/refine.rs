@@ -4,23 +4,23 @@ use super::*;
 use std::fs;
 
 #[test]
-fn a_model_is_moved_towards_the_photographs() {
+fn a_model_is_optimised_against_the_photographs() {
     let folder = tempfile::tempdir().unwrap();
     let words = format!(
         "refine {} . --views {INPUTS} --amount 8 -o {{}}/r.ply --report {{}}/r.json",
         asset().display()
     );
-    let said = succeed(folder.path(), &words).out;
+    let out = succeed(folder.path(), &words).out;
     let report = json(&folder.path().join("r.json"));
     let done = &report["refinement"];
     let psnr: Vec<f64> = done["psnr_db"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
     assert!(psnr[1] > psnr[0] + 0.05, "{psnr:?}");
-    assert!(said.contains("8 steps") && said.contains(&format!("{:.2} dB", psnr[1])), "{said}");
+    assert!(out.contains("8 steps") && out.contains(&format!("{:.2} dB", psnr[1])), "{out}");
     assert_eq!(
         (done["stop"].as_str(), report["settings"]["amount"]["iterations"].as_u64()),
         (Some("done"), Some(8))
     );
-    // As many Gaussians as before, elsewhere; and the same again.
+    // The number of Gaussians is unchanged, and a second run gives the same bytes.
     let (before, after) = (fs::read(asset()).unwrap(), fs::read(folder.path().join("r.ply")).unwrap());
     assert!(before.len() == after.len() && before != after);
     succeed(folder.path(), &words.replace("r.ply", "again.ply").replace("--amount", "--threads 1 --amount"));
@@ -28,7 +28,7 @@ fn a_model_is_moved_towards_the_photographs() {
 }
 
 #[test]
-fn what_cannot_be_refined_is_said() {
+fn invalid_refinements_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let asset = asset().display();

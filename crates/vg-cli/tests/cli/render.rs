@@ -31,7 +31,7 @@ fn every_camera_gives_a_picture_named_after_its_photograph() {
 }
 
 #[test]
-fn pictures_of_one_name_in_several_folders_keep_their_folders() {
+fn pictures_with_equal_names_in_several_folders_keep_their_folders() {
     let folder = tempfile::tempdir().unwrap();
     let text = fs::read_to_string(sample().join("transforms.json")).unwrap();
     let mut scene: serde_json::Value = serde_json::from_str(&text).unwrap();
@@ -57,7 +57,7 @@ fn pictures_of_one_name_in_several_folders_keep_their_folders() {
 }
 
 #[test]
-fn depth_is_16_bit_millimetres_beside_the_pictures() {
+fn depth_is_16_bit_millimetres_next_to_the_pictures() {
     let folder = tempfile::tempdir().unwrap();
     succeed(folder.path(), &format!("render {} --cameras . --views 002 --depth -o {{}}", asset().display()));
     let drawn = picture(&folder.path().join("depth/002.png"));
@@ -90,7 +90,7 @@ fn backgrounds_are_white_black_any_colour_or_transparent() {
 }
 
 #[test]
-fn a_turntable_walks_around_the_whole_vehicle() {
+fn a_turntable_shows_the_whole_vehicle_from_all_sides() {
     let folder = tempfile::tempdir().unwrap();
     let words = format!("render {} --turntable 5 --size 200x120 -o {{}}", asset().display());
     succeed(folder.path(), &words);
@@ -135,7 +135,7 @@ fn results_never_replace_each_other_or_the_scenes_own_pictures() {
         &["images/000.png", "would be replaced"],
     );
     assert!(fs::read(scene.path().join("images/000.png")).unwrap() == before);
-    // Two folders of pictures with the same names: the results keep the folders.
+    // With two folders of equally named pictures, the results keep the folders.
     fs::write(scene.path().join("transforms.json"), text.replace("images/001.png", "images/rear/000.png"))
         .unwrap();
     succeed(scene.path(), &format!("render {asset} --cameras {{}} -o {{}}/out"));
@@ -143,7 +143,7 @@ fn results_never_replace_each_other_or_the_scenes_own_pictures() {
 }
 
 #[test]
-fn the_backend_is_chosen_told_and_an_error_where_it_is_not_there() {
+fn the_backend_is_chosen_printed_and_an_error_if_unavailable() {
     let folder = tempfile::tempdir().unwrap();
     let render = |backend: &str| {
         format!("render {} --cameras . --views 005 --backend {backend} -o {{}}", asset().display())

@@ -1,9 +1,9 @@
-//! `vg report`: the page as a file. What a browser makes of it is in `tests/report.rs`.
+//! `vg report`: the page as a file. `tests/report.rs` opens it in a browser.
 
 use super::*;
 use std::fs;
 
-/// The page of the sample by silhouettes, and what was said of it, made once.
+/// The page of the sample by the shape prior, and the output of the program, made once.
 fn page() -> &'static (Run, String) {
     static PAGE: OnceLock<(Run, String)> = OnceLock::new();
     PAGE.get_or_init(|| {
@@ -14,12 +14,12 @@ fn page() -> &'static (Run, String) {
     })
 }
 
-/// What is between `from` and the next `to`, each time.
+/// All texts between `from` and the next `to`.
 fn all_between<'a>(text: &'a str, from: &str, to: &str) -> Vec<&'a str> {
     text.split(from).skip(1).map(|rest| rest.split(to).next().unwrap()).collect()
 }
 
-/// Fails at the first tag that closes what is not open.
+/// Fails at the first closing tag without an opening one.
 fn assert_closed(page: &str) {
     const VOID: [&str; 4] = ["meta", "link", "img", "input"];
     let mut open: Vec<&str> = Vec::new();
@@ -40,7 +40,7 @@ fn assert_closed(page: &str) {
 }
 
 #[test]
-fn the_page_needs_no_other_file_and_says_what_it_should() {
+fn the_page_needs_no_other_file_and_contains_all_results() {
     let (run, page) = page();
     assert!(run.out.contains("in 4 test views PSNR 25."), "{}", run.out);
     assert!((500_000..4_000_000).contains(&page.len()), "{} bytes", page.len());
@@ -57,19 +57,19 @@ fn the_page_needs_no_other_file_and_says_what_it_should() {
     assert_eq!(page.matches("<img ").count(), 4 * 2 + 4 * 3 + 1);
     assert_eq!(page.matches("alt=\"\"").count(), 0);
     let version = concat!("vg ", env!("CARGO_PKG_VERSION"), ", prior shape, head surfel");
-    for said in
+    for text in
         ["Split right_to_left of", "4 unseen views", "176 973", "outside the mask", "prior <b>", version]
     {
-        assert!(page.contains(said), "{said}");
+        assert!(page.contains(text), "{text}");
     }
-    assert!(page.contains("vg report . --prior shape -o /"), "no command to make it again");
+    assert!(page.contains("vg report . --prior shape -o /"), "the page lacks its command");
     assert!(page.contains("<dt>verdict</dt><dd>good</dd>") && !page.contains("class=\"warnings\""));
     let check = all_between(page, "Check of each input view", "</table>")[0];
     assert_eq!(check.matches("<tr><th scope=\"row\">").count(), 4);
 }
 
 #[test]
-fn another_run_draws_the_same_pictures_and_tells_the_same_numbers() {
+fn another_run_gives_the_same_pictures_and_numbers() {
     let folder = tempfile::tempdir().unwrap();
     succeed(folder.path(), "report . --prior shape --threads 1 -o {}/page.html");
     let again = fs::read_to_string(folder.path().join("page.html")).unwrap();
@@ -79,7 +79,7 @@ fn another_run_draws_the_same_pictures_and_tells_the_same_numbers() {
 }
 
 #[test]
-fn names_of_files_are_text_and_nothing_else() {
+fn names_of_files_are_escaped() {
     let scene = copy_of_sample(&["images", "masks", "transforms.json"]);
     let folder = scene.path().join("a <b>&\"'car");
     fs::create_dir(&folder).unwrap();
@@ -106,7 +106,7 @@ fn names_of_files_are_text_and_nothing_else() {
 }
 
 #[test]
-fn what_is_judged_follows_the_split_and_the_page_says_how() {
+fn the_test_views_follow_the_split_and_the_page_describes_them() {
     let folder = tempfile::tempdir().unwrap();
     let made = |words: &str| {
         succeed_with_warnings(folder.path(), &format!("report . --prior hull {words} -o {{}}/page.html"));
@@ -127,17 +127,17 @@ fn what_is_judged_follows_the_split_and_the_page_says_how() {
 }
 
 #[test]
-fn mistakes_are_named_and_nothing_that_was_read_is_replaced() {
+fn errors_are_named_and_no_input_is_replaced() {
     let scene = copy_of_sample(&["images", "masks", "transforms.json"]);
     let at = scene.path();
-    // In the scene's own folder: the sample's has a split.
+    // The sample's own folder has a split.
     let done = Command::new(env!("CARGO_BIN_EXE_vg"))
         .args(["report", ".", "--only", "x", "-o", "page.html"])
         .current_dir(at)
         .output()
         .unwrap();
-    let said = String::from_utf8(done.stderr).unwrap();
-    assert!(said.starts_with("vg: error: --only x: no split.json here"), "{said}");
+    let error = String::from_utf8(done.stderr).unwrap();
+    assert!(error.starts_with("vg: error: --only x: no split.json here"), "{error}");
     assert_eq!(done.status.code(), Some(1));
     fail(at, "report {} --views 000 --split s.json -o {}/page.html", 2, &["--split", "--views"]);
     fail(at, "report {}", 2, &["--output <PAGE.html>"]);

@@ -1,10 +1,10 @@
-//! What results may not replace, what their names must say, and standard output.
+//! Rules for results: which files they must not replace, the ending of their names, and standard output.
 
 use super::*;
 use std::collections::BTreeMap;
 use std::fs;
 
-/// Content of every file in the folder and below.
+/// Content of every file below the folder.
 fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap() {
@@ -18,7 +18,7 @@ fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-/// The sample with a model and what else commands read.
+/// The sample with a model and the other inputs of commands.
 fn scene_with_model() -> tempfile::TempDir {
     let parts =
         ["transforms.json", "split.json", "vehicle_from_world.json", "images", "masks", "depth", "sparse"];
@@ -65,13 +65,13 @@ fn no_command_writes_over_a_file_of_its_scene_or_one_that_it_reads() {
         fail(scene.path(), words, 1, &["part of the scene", "choose another folder"]);
     }
     assert!(contents(scene.path()) == before);
-    // What the command makes may be made again.
+    // Results of an earlier run may be replaced.
     succeed(scene.path(), "align {} --matrix vehicle_from_world.json -o {}/vehicle_from_world.json");
     assert!(contents(scene.path()) != before);
 }
 
 #[test]
-fn the_demo_replaces_no_scene_but_its_own() {
+fn the_demo_replaces_only_its_own_scene() {
     let folder = tempfile::tempdir().unwrap();
     let own = folder.path().join("scene/images/000.png");
     copy(&sample().join("images/001.png"), &own);
@@ -81,7 +81,7 @@ fn the_demo_replaces_no_scene_but_its_own() {
 }
 
 #[test]
-fn one_new_file_in_two_spellings_is_one_result_too_many() {
+fn two_results_with_the_same_path_in_two_spellings_are_an_error() {
     let folder = tempfile::tempdir().unwrap();
     for other in ["{}/./a.ply", "{}/new/../a.ply", "{}/new/../../{}/a.ply"] {
         let other = other.replacen(
@@ -102,7 +102,7 @@ fn one_new_file_in_two_spellings_is_one_result_too_many() {
 }
 
 #[test]
-fn a_name_of_another_format_is_refused_before_the_work() {
+fn a_name_with_the_ending_of_another_format_is_refused_before_the_work() {
     let folder = tempfile::tempdir().unwrap();
     for (words, ending) in [
         ("reconstruct . -o {}/car.spz", ".ply"),
@@ -121,7 +121,7 @@ fn a_name_of_another_format_is_refused_before_the_work() {
 }
 
 #[test]
-fn a_result_named_dash_is_all_that_standard_output_gets() {
+fn a_result_named_dash_is_the_only_output_on_standard_output() {
     let at = Path::new(".");
     let made = Command::new(env!("CARGO_BIN_EXE_vg"))
         .args(["reconstruct", ".", "--views", "000,001", "--prior", "given", "-o", "-"])

@@ -1,9 +1,9 @@
-//! `--threads`: so many are started by a command, all in all, and one clear error where the system starts fewer.
+//! `--threads`: the total number of threads that a command starts, and one clear error if the system starts fewer.
 
 use super::*;
 use vg_testing::tools::{cc, few_threads, have, scratch};
 
-/// Commands that read, reconstruct, measure, align, optimise, draw and write, as little as that can be.
+/// Commands that read, reconstruct, measure, align, optimise, draw and write, each as small as possible.
 const COMMANDS: [&str; 8] = [
     "reconstruct . --views 000,001 --resolution 0.2 -o {}/a.ply --points {}/p.ply --report {}/r.json",
     "reconstruct . --views 000,001 --prior shape --resolution 0.2 --refine 2 -o {}/b.ply",
@@ -15,7 +15,7 @@ const COMMANDS: [&str; 8] = [
     "align . --scan {}/scan.ply -o {}/v.json",
 ];
 
-/// Runs a command where at most `allowed` threads can be started.
+/// Runs a command on a system that can start at most `allowed` threads.
 fn vg_where_few_start(folder: &Path, words: &str, allowed: u32) -> Run {
     let library = folder.join("few_threads.so");
     if !library.exists() {
@@ -25,14 +25,14 @@ fn vg_where_few_start(folder: &Path, words: &str, allowed: u32) -> Run {
     let args: Vec<String> = words.split_whitespace().map(|word| word.replace("{}", place)).collect();
     let mut command = Command::new(env!("CARGO_BIN_EXE_vg"));
     command.args(&args).current_dir(sample());
-    // Not what rayon would go by.
+    // This variable of rayon must have no effect.
     command.env("RAYON_NUM_THREADS", "5");
     command.env("LD_PRELOAD", library).env("VG_TEST_THREADS", allowed.to_string());
     ran(&mut command)
 }
 
 #[test]
-fn one_thread_is_the_programs_own_and_three_are_three() {
+fn one_thread_is_the_main_thread_and_three_are_three_in_total() {
     if !have(&cc(), "gcc", "a system that starts few threads") {
         return;
     }
@@ -50,11 +50,11 @@ fn one_thread_is_the_programs_own_and_three_are_three() {
         bytes.push(results.map(|name| std::fs::read(at.join(name)).unwrap()));
         assert_eq!(json(&at.join("r.json"))["threads"], threads);
     }
-    assert!(bytes[0] == bytes[1], "the same bytes with any number of threads");
+    assert!(bytes[0] == bytes[1], "the bytes depend on the number of threads");
 }
 
 #[test]
-fn threads_that_cannot_start_are_one_error_that_says_the_way_out() {
+fn threads_that_cannot_start_are_one_error_with_the_remedy() {
     if !have(&cc(), "gcc", "a system that starts few threads") {
         return;
     }
@@ -71,7 +71,7 @@ fn threads_that_cannot_start_are_one_error_that_says_the_way_out() {
         assert_one_error(&run);
         assert!(run.err.contains(cause), "vg {words}: {run:?}");
     }
-    // What needs none works.
+    // Commands that need no thread still work.
     let run = vg_where_few_start(at, "info {}/a.ply", 0);
     assert_eq!((run.code, run.err.as_str()), (0, ""), "{run:?}");
 }

@@ -1,12 +1,12 @@
-//! Writes small ONNX files: just enough of the format's protocol buffers for the graphs of these tests.
+//! Writes small ONNX files: the part of the protocol-buffer format that the graphs of these tests need.
 
 use std::path::Path;
 
-/// ONNX's number for float32, and for int64.
+/// ONNX's type numbers of float32 and int64.
 pub const FLOAT: u64 = 1;
 pub const INT64: u64 = 7;
 
-/// A model in the making.
+/// A model under construction.
 #[derive(Clone, Default)]
 pub struct Graph {
     nodes: Vec<Node>,
@@ -20,7 +20,7 @@ pub struct Graph {
 struct Node {
     inputs: Vec<String>,
     output: String,
-    /// What comes after them in the file.
+    /// The data that follows them in the file.
     rest: Vec<u8>,
 }
 
@@ -69,7 +69,7 @@ impl Graph {
         self
     }
 
-    /// The node that gives `output` gives `name` instead; those that take it keep taking it.
+    /// Renames the output of the node that gives `output` to `name`; nodes that use it keep using it.
     pub fn rename_output_of(&mut self, output: &str, name: &str) {
         for node in &mut self.nodes {
             if node.output == output {
@@ -99,7 +99,7 @@ impl Graph {
         self
     }
 
-    /// The same as `say`, without handing the graph on.
+    /// Sets a metadata entry, as `say` does, without returning the graph.
     pub fn set(&mut self, key: &str, value: &str) {
         self.say(key, value);
     }

@@ -40,7 +40,7 @@ pub fn opened(path: &Path) -> Option<Result<Model>> {
     }
 }
 
-/// Attributes that are the same at every pixel: 0 but for scale channels of `scale`.
+/// A head with equal attributes at every pixel: 0 except for scale channels of `scale`.
 pub fn constant(multiple: &str, scale: f32) -> Graph {
     let mut g = Graph::default();
     g.inputs = vec![
@@ -74,7 +74,7 @@ pub fn brightness(sides: Option<(u64, u64)>) -> Graph {
     g
 }
 
-/// White where the vehicle is, and a white car to the left of it.
+/// White on the vehicle, and a white car to the left of it.
 pub fn black_and_white(view: &View, neighbour: bool) -> RgbImage {
     let (width, height) = (view.camera.width, view.camera.height);
     let mask = view.mask.as_ref().unwrap();

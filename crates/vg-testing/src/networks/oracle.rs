@@ -6,12 +6,12 @@ use crate::vehicle::HALF;
 use glam::DMat3;
 use vg::Camera;
 
-/// How a network that knows the shape says it.
+/// The convention of a network that contains the exact shape.
 #[derive(Clone, Copy, Debug)]
 pub struct Manner {
     pub along_ray: bool,
     pub is_metric: bool,
-    /// Its unit in metres: depth and translations are divided by it, and `scale` says it if it is metric.
+    /// Its unit in metres: depth and translations are divided by it, and `scale` is the unit if the network is metric.
     pub unit: f32,
 }
 
@@ -106,22 +106,22 @@ pub fn ellipsoid(first: &Camera, width: u64, height: u64, manner: Manner) -> Gra
         &[],
     );
     g.node("Add", &["mask", "one"], "confidence", &[]);
-    g.floats("said", &[1], &[if manner.is_metric { manner.unit } else { 1.0 }]).node(
+    g.floats("declared_unit", &[1], &[if manner.is_metric { manner.unit } else { 1.0 }]).node(
         "Identity",
-        &["said"],
+        &["declared_unit"],
         "scale",
         &[],
     );
 
-    // Translations in its unit.
+    // Translations in the network's unit.
     let mut shrink = [1.0f32; 16];
     [3, 7, 11].iter().for_each(|k: &usize| shrink[*k] = 1.0 / manner.unit);
     g.floats("shrink", &[1, 4, 4], &shrink).node("Mul", &["cam_to_ref", "shrink"], "cam_to_ref_pred", &[]);
     g
 }
 
-/// A graph that takes the oracle's place for `output`, with `value` in all of its elements.
-pub fn says(graph: &mut Graph, output: &str, value: f32) {
+/// Replaces `output` of the graph by a constant `value` in all of its elements.
+pub fn set_output(graph: &mut Graph, output: &str, value: f32) {
     graph.rename_output_of(output, "before");
     graph.floats("broken", &[1], &[value]).floats("nothing", &[1], &[0.0]);
     graph.node("Mul", &["before", "nothing"], "none", &[]);
