@@ -38,8 +38,8 @@ MARKS = {
     "OFL-1.1": ["SIL Open Font License Version 1.1"],
 }
 
-# Corrections of a crate's manifest: the licences of all its contents, and the file with their text. As in deny.toml.
-CLARIFIED = {"notosans": ("(MIT OR Apache-2.0) AND OFL-1.1", "fonts/LICENSE_OFL.txt")}
+# Corrections of a crate's manifest: the licences of all its contents, and a file with a text that it lacks. As in deny.toml.
+CLARIFIED = {"noto-sans-mono-bitmap": ("MIT AND OFL-1.1", ROOT / "scripts/OFL-1.1.txt")}
 
 # Shortest and plainest first.
 PREFERRED = list(MARKS)

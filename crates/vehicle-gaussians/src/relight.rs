@@ -21,6 +21,7 @@ use glam::{Quat, Vec3};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::ops::Range;
+use vg_geometry::MIRROR_Y;
 use vg_splat::gaussians::{Gaussians, sh};
 
 /// Whether clones are shown in the light of their own side.
@@ -334,7 +335,7 @@ fn log_likelihood(facets: &[Facet], day: &Day) -> f32 {
 fn log_ratio(posterior: &[(f32, Day)], normal: Vec3) -> (f32, f32) {
     let (mut log, mut share) = (0.0, 0.0);
     for (p, day) in posterior {
-        let (here, there) = (day.light(normal), day.light(normal * Vec3::new(1.0, -1.0, 1.0)));
+        let (here, there) = (day.light(normal), day.light(normal * MIRROR_Y));
         log += p * (here.0 / there.0).ln();
         share += p * (here.1 - there.1);
     }
@@ -431,7 +432,7 @@ mod tests {
         let (mut before, mut after, mut n) = (0.0, 0.0, 0.0);
         for i in 0..seen.len() {
             let here = normal(seen.rotations()[i]);
-            let there = here * Vec3::new(1.0, -1.0, 1.0);
+            let there = here * MIRROR_Y;
             if there.y > 0.5 {
                 let mirrored = shown(albedo, day, here)[1];
                 let truth = shown(albedo, day, there)[1];
@@ -479,7 +480,7 @@ mod tests {
         let light = Light::estimate(&painted(GREY, &sun(-60.0, 40.0, 3.0))).unwrap();
         for i in 0..SIDE * SIDE {
             let d = direction(i);
-            let both = light.gain(d) * light.gain(d * Vec3::new(1.0, -1.0, 1.0));
+            let both = light.gain(d) * light.gain(d * MIRROR_Y);
             assert!((both - Vec3::ONE).abs().max_element() < 1e-4, "{d}: {both}");
             let most = (1.4 * MOST_LOG_GAIN / DISPLAY_GAMMA).exp();
             assert!(light.gain(d).max_element() < most, "{d}");

@@ -8,6 +8,7 @@ mod args;
 mod cloud;
 mod contact;
 mod demo;
+mod drawing;
 mod eval;
 mod files;
 mod grid;

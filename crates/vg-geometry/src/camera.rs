@@ -41,6 +41,13 @@ impl Intrinsics {
     pub fn normalized_from_pixel(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         [(u - self.cx) / self.fx, (v - self.cy) / self.fy]
     }
+
+    /// The ray through the centre of the pixel in column `u`, row `v`, in the camera frame: (x/z, y/z, 1), so that a
+    /// multiple of it by z has planar depth z. Without a lens; [`Camera::ray`] knows one.
+    pub fn pixel_ray(&self, u: u32, v: u32) -> DVec3 {
+        let [x, y] = self.normalized_from_pixel([f64::from(u) + 0.5, f64::from(v) + 0.5]);
+        DVec3::new(x, y, 1.0)
+    }
 }
 
 /// The supported camera models of COLMAP, with COLMAP's ids.

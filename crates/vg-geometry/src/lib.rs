@@ -10,6 +10,7 @@
 
 pub mod align;
 pub mod camera;
+pub mod descent;
 pub mod distortion;
 pub mod error;
 pub mod frame;
@@ -29,5 +30,5 @@ pub use distortion::Distortion;
 pub use error::{Error, Result};
 pub use pixels::PixelAndDepth;
 pub use placed::Turntable;
-pub use pose::Pose;
+pub use pose::{MIRROR_Y, Pose};
 pub use robust::RobustFit;

@@ -1,10 +1,13 @@
 //! Rigid transforms `to_from`: p_to = R p_from + t (paper eq. `vehicle_point`).
 
 use crate::error::{Error, Result};
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3, Vec3};
 
 /// Largest entry of `R^T R - I` that is taken for noise and removed (poses written with three digits).
 pub const MAX_ORTHONORMALITY_ERROR: f64 = 1e-2;
+
+/// Times this a point of the vehicle frame is its mirror image across y = 0.
+pub const MIRROR_Y: Vec3 = Vec3::new(1.0, -1.0, 1.0);
 
 /// A rotation and a translation in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,7 +94,7 @@ impl Pose {
     /// The mirrored pose across y = 0 with the camera's x axis flipped too, so that it stays a rotation:
     /// M R diag(-1,1,1), M t. It sees the mirrored vehicle as the horizontally flipped picture.
     pub fn mirrored(&self) -> Self {
-        let m = DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0));
+        let m = DMat3::from_diagonal(MIRROR_Y.as_dvec3());
         let flip = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
         Self { rotation: m * self.rotation * flip, translation: m * self.translation }
     }
@@ -125,7 +128,7 @@ mod tests {
         assert!(defect.to_cols_array().iter().all(|x| x.abs() < 1e-14));
         assert!((pose.rotation - r).to_cols_array().iter().all(|x| x.abs() < 1.1e-3));
 
-        let mirror = r * DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0));
+        let mirror = r * DMat3::from_diagonal(MIRROR_Y.as_dvec3());
         let error = Pose::new("views[0].pose", mirror, DVec3::ZERO).unwrap_err().to_string();
         assert!(error.contains("views[0].pose") && error.contains("det R"), "{error}");
         assert!(Pose::new("pose", r * 1.1, DVec3::ZERO).is_err());

@@ -103,9 +103,7 @@ impl Fit {
 
 /// Direction of a pixel's ray with z = 1.
 pub fn ray(i: &Intrinsics, pixel: usize, width: u32) -> DVec3 {
-    let (u, v) = (pixel as u32 % width, pixel as u32 / width);
-    let [x, y] = i.normalized_from_pixel([f64::from(u) + 0.5, f64::from(v) + 0.5]);
-    DVec3::new(x, y, 1.0)
+    i.pixel_ray(pixel as u32 % width, pixel as u32 / width)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Views and scenes, and their validation.
 
 use super::{Cloud, DepthMap, Mask, RgbImage, VehicleBox};
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use vg_geometry::Camera;
 use vg_geometry::{Error, Result};
 
@@ -71,9 +71,7 @@ impl View {
     /// The point at planar depth `z` metres on the ray of the centre of pixel (u, v) of a pinhole view, vehicle frame
     /// (paper eqs. `metric_point_ray`, `vehicle_point`).
     pub fn lift(&self, u: u32, v: u32, z: f32) -> Vec3 {
-        let pixel = [f64::from(u) + 0.5, f64::from(v) + 0.5];
-        let [x, y] = self.camera.intrinsics.normalized_from_pixel(pixel);
-        let point_camera = DVec3::new(x, y, 1.0) * f64::from(z);
+        let point_camera = self.camera.intrinsics.pixel_ray(u, v) * f64::from(z);
         self.camera.vehicle_from_camera.transform_point(point_camera).as_vec3()
     }
 

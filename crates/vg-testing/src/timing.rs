@@ -15,8 +15,8 @@ pub fn ms(d: Duration) -> f64 {
 /// Processor time of all threads of this process.
 #[cfg(unix)]
 pub fn cpu_time() -> Duration {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-    Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
+    let time = nix::time::clock_gettime(nix::time::ClockId::CLOCK_PROCESS_CPUTIME_ID).expect("a clock");
+    Duration::new(time.tv_sec() as u64, time.tv_nsec() as u32)
 }
 
 #[cfg(not(unix))]

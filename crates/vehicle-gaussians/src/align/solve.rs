@@ -6,6 +6,7 @@
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Cholesky, SMatrix, SVector};
 use vg_geometry::Similarity;
+use vg_geometry::descent::Descent;
 use vg_geometry::progress::Watch;
 
 /// Parameters of a step: omega (radians), t (metres), sigma (1).
@@ -78,6 +79,9 @@ pub(super) fn moved(s: &Similarity, center: DVec3, step: &Numbers) -> Similarity
     Similarity { scale: s.scale * grow, rotation, translation }
 }
 
+/// The number of steps is the caller's.
+const DESCENT: Descent = Descent { steps: 0, trials: 5, stiffen: 10.0, least_damping: 1e-7, enough: 1e-5 };
+
 /// Minimises the cost from `start` in at most `steps` steps; returns the similarity and its cost.
 pub(super) fn descend(
     start: Similarity,
@@ -86,32 +90,14 @@ pub(super) fn descend(
     watch: &Watch,
     system: impl Fn(&Similarity) -> System,
 ) -> (Similarity, f64) {
-    const TRIALS: usize = 5;
-    const ENOUGH: f64 = 1e-5;
-    let mut best = start;
-    let mut at = system(&best);
-    let mut damping = 1e-3;
-    for _ in 0..steps {
+    let at = (start, system(&start));
+    let step = |(s, at): &(Similarity, System), _: &(), damping: f64| {
         if watch.is_stopped() {
-            break;
+            return None;
         }
-        let mut gained = None;
-        for _ in 0..TRIALS {
-            let Some(step) = at.step(damping) else { break };
-            let next = moved(&best, center, &step);
-            let there = system(&next);
-            if there.cost < at.cost {
-                gained = Some(at.cost - there.cost);
-                (best, at) = (next, there);
-                damping = (damping * 0.2).max(1e-7);
-                break;
-            }
-            damping *= 10.0;
-        }
-        match gained {
-            Some(gain) if gain > ENOUGH * at.cost => {}
-            _ => break,
-        }
-    }
+        let next = moved(s, center, &at.step(damping)?);
+        Some((next, system(&next)))
+    };
+    let (best, at) = Descent { steps, ..DESCENT }.run(at, |(_, at)| at.cost, |_| (), step);
     (best, at.cost)
 }

@@ -9,7 +9,7 @@ use super::correction::Correction;
 use super::samples::Sample;
 use crate::prior::volume::Silhouette;
 use glam::{DVec3, Mat3, Vec3};
-use vg_geometry::Pose;
+use vg_geometry::{MIRROR_Y, Pose};
 use vg_scene::View;
 
 /// Maximum slope of a cone's value along a ray, metres per metre: 1 across a pixel's own ray, more off the
@@ -70,8 +70,6 @@ pub(super) struct Contact {
     pub(super) gradient: Vec3,
 }
 
-const MIRROR: Vec3 = Vec3::new(1.0, -1.0, 1.0);
-
 impl<'a> Cones<'a> {
     pub(super) fn new(
         silhouettes: &'a [Silhouette],
@@ -104,7 +102,7 @@ impl<'a> Cones<'a> {
 
     fn one(&self, view: usize, mirrored: bool, p: Vec3) -> f32 {
         let (rotation, translation) = self.camera_from_vehicle[view];
-        let p = if mirrored { p * MIRROR } else { p };
+        let p = if mirrored { p * MIRROR_Y } else { p };
         self.silhouettes[view].inside_camera(rotation * p + translation)
     }
 

@@ -93,6 +93,5 @@ fn thinned(pixels: &[[u32; 2]], most: usize) -> impl Iterator<Item = [u32; 2]> {
 }
 
 fn direction(view: &View, x: u32, y: u32) -> Vec3 {
-    let [x, y] = view.camera.intrinsics.normalized_from_pixel([f64::from(x) + 0.5, f64::from(y) + 0.5]);
-    DVec3::new(x, y, 1.0).normalize().as_vec3()
+    view.camera.intrinsics.pixel_ray(x, y).normalize().as_vec3()
 }

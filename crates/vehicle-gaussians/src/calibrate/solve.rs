@@ -8,6 +8,8 @@ use crate::prior::volume::Silhouette;
 use glam::Vec3;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
+use vg_geometry::MIRROR_Y;
+use vg_geometry::descent::Descent;
 use vg_scene::View;
 
 /// Noise of a deficit, metres: a mask is accurate to about a pixel.
@@ -18,11 +20,8 @@ const NOISE_M: f64 = 0.01;
 /// twin of one camera doubles that: 8. Each is a stretch of edge rather than a point.
 const OBSERVATIONS_PER_PAIR: f64 = 16.0;
 
-/// Maximum of steps for each scale of the loss.
-const STEPS: usize = 6;
-
-/// Part of the cost below which a step's gain ends the iteration.
-const ENOUGH: f64 = 0.01;
+/// The descent at each scale of the loss.
+const DESCENT: Descent = Descent { steps: 6, trials: 4, stiffen: 20.0, least_damping: 1e-6, enough: 0.01 };
 
 /// The part of the problem that does not depend on the correction.
 pub(super) struct Problem<'a> {
@@ -39,6 +38,13 @@ pub(super) enum Free {
     Plane,
     /// The parameters of the plane and of all cameras.
     All,
+}
+
+/// A correction, where the rays meet the cones with it, and what that costs.
+struct Tried {
+    correction: Correction,
+    meetings: Vec<Meeting>,
+    cost: f64,
 }
 
 impl Problem<'_> {
@@ -65,21 +71,23 @@ impl Problem<'_> {
     ) -> Correction {
         let mut correction = start.clone();
         for &scale in scales {
-            let mut meetings = self.meetings(&correction, samples, &[]);
-            let mut cost = self.cost(&correction, samples, &meetings, scale);
-            let mut damping = 1e-3;
-            for _ in 0..STEPS {
-                let Some((moved, met, lower)) =
-                    self.step(&correction, samples, &meetings, free, scale, cost, &mut damping)
-                else {
-                    break;
-                };
-                let gain = cost - lower;
-                (correction, meetings, cost) = (moved, met, lower);
-                if gain < ENOUGH * cost {
-                    break;
+            let meetings = self.meetings(&correction, samples, &[]);
+            let cost = self.cost(&correction, samples, &meetings, scale);
+            let at = Tried { correction, meetings, cost };
+            let linearize = |at: &Tried| self.normal_equations(at, samples, free, scale);
+            let moved = |at: &Tried, (matrix, right): &(DMatrix<f64>, DVector<f64>), damping: f64| {
+                let mut damped = matrix.clone();
+                for k in 0..damped.nrows() {
+                    damped[(k, k)] *= 1.0 + damping;
                 }
-            }
+                let mut step = Cholesky::new(damped)?.solve(right).as_slice().to_vec();
+                step.resize(at.correction.numbers().len(), 0.0);
+                let correction = at.correction.moved(&step);
+                let meetings = self.meetings(&correction, samples, &at.meetings);
+                let cost = self.cost(&correction, samples, &meetings, scale);
+                Some(Tried { correction, meetings, cost })
+            };
+            correction = DESCENT.run(at, |at| at.cost, linearize, moved).correction;
         }
         correction
     }
@@ -97,44 +105,10 @@ impl Problem<'_> {
         self.weight(samples) * rays + pull.sum::<f64>()
     }
 
-    /// A step that lowers the cost, or `None`.
-    fn step(
-        &self,
-        correction: &Correction,
-        samples: &[Sample],
-        meetings: &[Meeting],
-        free: Free,
-        scale: f64,
-        cost: f64,
-        damping: &mut f64,
-    ) -> Option<(Correction, Vec<Meeting>, f64)> {
-        const TRIALS: usize = 4;
-        let (matrix, right) = self.normal_equations(correction, samples, meetings, free, scale);
-        for _ in 0..TRIALS {
-            let mut damped = matrix.clone();
-            for k in 0..damped.nrows() {
-                damped[(k, k)] *= 1.0 + *damping;
-            }
-            let mut step = Cholesky::new(damped)?.solve(&right).as_slice().to_vec();
-            step.resize(correction.numbers().len(), 0.0);
-            let moved = correction.moved(&step);
-            let met = self.meetings(&moved, samples, meetings);
-            let lower = self.cost(&moved, samples, &met, scale);
-            // A NaN cost is not lower.
-            if lower < cost {
-                *damping = (*damping * 0.2).max(1e-6);
-                return Some((moved, met, lower));
-            }
-            *damping *= 20.0;
-        }
-        None
-    }
-
     fn normal_equations(
         &self,
-        correction: &Correction,
+        Tried { correction, meetings, .. }: &Tried,
         samples: &[Sample],
-        meetings: &[Meeting],
         free: Free,
         scale: f64,
     ) -> (DMatrix<f64>, DVector<f64>) {
@@ -200,7 +174,7 @@ impl Row {
         let (origin, direction) = cones.ray(sample);
         let p = origin + meeting.t * direction;
         for contact in cones.contacts(sample, meeting).into_iter().flatten() {
-            let mirror = if contact.mirrored { Vec3::new(1.0, -1.0, 1.0) } else { Vec3::ONE };
+            let mirror = if contact.mirrored { MIRROR_Y } else { Vec3::ONE };
             // The point moves with its own camera; the cone moves away under it.
             row.push(middle, sample.view, p, contact.gradient, free);
             row.push(middle, contact.view, p * mirror, -contact.gradient * mirror, free);

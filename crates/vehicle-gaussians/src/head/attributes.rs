@@ -72,8 +72,8 @@ pub fn activate(
     };
     let mut sh = [0.0; 27];
     sh.copy_from_slice(&raw[11..]);
-    for (residual, base) in sh.iter_mut().zip(sh::from_rgb(rgb)) {
-        *residual += base;
+    for (coefficient, base) in sh.iter_mut().zip(sh::from_rgb(rgb)) {
+        *coefficient += base;
     }
     Activated {
         mean: mean.to_array(),

@@ -120,8 +120,7 @@ fn surfel(view: &View, geometry: &Geometry, i: usize, pixel: usize) -> Option<(G
     let (u, v) = (pixel as u32 % camera.width, pixel as u32 / camera.width);
     let z = geometry.depths[i].get(u, v)?;
     let normal = geometry.normals[i][pixel];
-    let [x, y] = camera.intrinsics.normalized_from_pixel([f64::from(u) + 0.5, f64::from(v) + 0.5]);
-    let ray = Vec3::new(x as f32, y as f32, 1.0);
+    let ray = camera.intrinsics.pixel_ray(u, v).as_vec3();
     let direction = ray.normalize();
 
     let cos = normal.dot(-direction).max(1.0 / MAX_STRETCH);

@@ -21,7 +21,7 @@ use glam::{Quat, Vec3};
 use rayon::prelude::*;
 use vg_geometry::frame::pose_from_box;
 use vg_geometry::progress::{Context, ProgressCallback, Threads};
-use vg_geometry::{Camera, Similarity};
+use vg_geometry::{Camera, MIRROR_Y, Similarity};
 use vg_geometry::{Error, Result};
 use vg_scene::visibility::{Observer, SURFACE_M, Sight};
 use vg_scene::{Cloud, Place, Scene, View, mirror, resize, undistort};
@@ -409,11 +409,10 @@ impl Mirrored {
 
 /// Centre and normal of the mirror image of a surfel, and the resolution at which the original was seen.
 fn mirrored_place(gaussians: &Gaussians, i: usize) -> (Vec3, Vec3, f32) {
-    let flip = Vec3::new(1.0, -1.0, 1.0);
     let [w, x, y, z] = gaussians.rotations()[i];
     let normal = Quat::from_xyzw(x, y, z, w) * Vec3::Z;
     let coarsest = gaussians.scales()[i].into_iter().fold(0.0, f32::max);
-    (Vec3::from_array(gaussians.means()[i]) * flip, normal * flip, FOOTPRINT_SIGMA_PX / coarsest)
+    (Vec3::from_array(gaussians.means()[i]) * MIRROR_Y, normal * MIRROR_Y, FOOTPRINT_SIGMA_PX / coarsest)
 }
 
 /// All in the caller's frame again, the views with the cameras that the calibration found.

@@ -2,6 +2,7 @@
 
 use crate::prior::volume::whereabouts;
 use glam::DVec3;
+use vg_geometry::MIRROR_Y;
 use vg_scene::{Mask, View};
 
 /// Positions in `views` of at most `most`, in order. A view and its mirrored twin show the same, so directions
@@ -14,10 +15,10 @@ pub(super) fn spread(views: &[View], most: usize) -> Vec<usize> {
     let middle = whereabouts(views).map_or(DVec3::ZERO, |(middle, _)| middle);
     let directions: Vec<DVec3> =
         views.iter().map(|v| (v.camera.center() - middle).normalize_or(DVec3::X)).collect();
-    let flip = DVec3::new(1.0, -1.0, 1.0);
+    let mirror = MIRROR_Y.as_dvec3();
     let apart = |a: usize, b: usize| {
         let (a, b) = (directions[a], directions[b]);
-        a.angle_between(b).min(a.angle_between(b * flip))
+        a.angle_between(b).min(a.angle_between(b * mirror))
     };
     // The view that shows most of the vehicle first, then always the one farthest from all that were taken.
     let shown = |i: usize| views[i].mask.as_ref().map_or(0, Mask::vehicle_pixels);

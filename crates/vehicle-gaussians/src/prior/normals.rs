@@ -45,9 +45,9 @@ fn normal_at(camera: &Camera, inverse: &[f32], u: usize, v: usize) -> Vec3 {
             }
         };
     let i = camera.intrinsics;
-    let [x, y] = i.normalized_from_pixel([u as f64 + 0.5, v as f64 + 0.5]).map(|c| c as f32);
+    let ray = i.pixel_ray(u as u32, v as u32).as_vec3();
     let (nx, ny) = (slope(1, 0) * i.fx as f32, slope(0, 1) * i.fy as f32);
-    let plane = Vec3::new(nx, ny, here - nx * x - ny * y);
+    let plane = Vec3::new(nx, ny, here - nx * ray.x - ny * ray.y);
     // 1/z > 0 means plane . ray > 0: it points away from the camera.
     -plane.try_normalize().unwrap_or(Vec3::Z)
 }
@@ -70,9 +70,8 @@ mod tests {
         let n = Vec3::new(0.3, -0.4, -0.8).normalize();
         let depth = (0..16 * 12)
             .map(|k| {
-                let [x, y] = i.normalized_from_pixel([f64::from(k % 16) + 0.5, f64::from(k / 16) + 0.5]);
                 // n . p = -5
-                (-5.0 / n.dot(Vec3::new(x as f32, y as f32, 1.0))).max(0.0)
+                (-5.0 / n.dot(i.pixel_ray(k % 16, k / 16).as_vec3())).max(0.0)
             })
             .collect();
         let depth = DepthMap::new(16, 12, depth).unwrap();

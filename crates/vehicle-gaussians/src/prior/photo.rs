@@ -13,6 +13,7 @@ use super::volume::{Field, march};
 use glam::Vec3;
 use rayon::prelude::*;
 use serde::Serialize;
+use vg_geometry::MIRROR_Y;
 use vg_geometry::Result;
 use vg_scene::View;
 use vg_scene::visibility::{Observer, Sight};
@@ -126,12 +127,11 @@ impl Patch {
     }
 
     fn mirrored(&self) -> Self {
-        let flip = |p: Vec3| Vec3::new(p.x, -p.y, p.z);
         Self {
-            center: flip(self.center),
-            normal: flip(self.normal),
-            across: flip(self.across),
-            up: flip(self.up),
+            center: self.center * MIRROR_Y,
+            normal: self.normal * MIRROR_Y,
+            across: self.across * MIRROR_Y,
+            up: self.up * MIRROR_Y,
         }
     }
 }

@@ -52,9 +52,9 @@ pub(crate) fn run(args: &ParetoArgs) -> Result {
     if let Some(path) = &args.csv {
         files::write(path, |out| out.write_all(grid.csv().as_bytes()))?;
     }
-    let drawn = plot::svg(&points, &args.title);
+    let drawn = plot::draw(&points, &args.title);
     if let Some((path, drawn)) = args.svg.as_ref().zip(drawn.as_ref()) {
-        files::write(path, |out| out.write_all(drawn.as_bytes()))?;
+        files::write(path, |out| out.write_all(drawn.svg().as_bytes()))?;
     }
     if let Some((path, drawn)) = args.png.as_ref().zip(drawn.as_ref()) {
         let png = raster::png(drawn)?;

@@ -1,15 +1,15 @@
-//! Plot of the sweep: error against run time, as SVG.
+//! Plot of the sweep: error against run time.
 
 use super::{Point, labels, place};
-use crate::shown;
-use std::fmt::Write;
+use crate::drawing::{Anchor, Color, Direction, Drawing, Font, Shape, Text};
 
 const SIZE: [f64; 2] = [860.0, 520.0];
 /// Left, top, right, bottom.
 const MARGIN: [f64; 4] = [64.0, 48.0, 24.0, 56.0];
-const GREY: &str = "#6b7280";
-const FRONT: &str = "#1d4ed8";
-const BEHIND: &str = "#b45309";
+const GREY: Color = [0x6b, 0x72, 0x80];
+const PALE: Color = [0xe5, 0xe7, 0xeb];
+const FRONT: Color = [0x1d, 0x4e, 0xd8];
+const BEHIND: Color = [0xb4, 0x53, 0x09];
 
 /// An axis: maps values to coordinates of the picture.
 struct Axis {
@@ -71,7 +71,7 @@ impl<'a> Mark<'a> {
 }
 
 /// PSNR of the test views against seconds, both with their spread; a line joins the front. `None` without points.
-pub(super) fn svg(points: &[Point], title: &str) -> Option<String> {
+pub(super) fn draw(points: &[Point], title: &str) -> Option<Drawing> {
     let rows: Vec<Mark> = points.iter().filter_map(Mark::from_point).collect();
     if rows.is_empty() {
         return None;
@@ -93,88 +93,46 @@ pub(super) fn svg(points: &[Point], title: &str) -> Option<String> {
         to: MARGIN[1],
         is_log: false,
     };
-    let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
-         font-size=\"13\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n\
-         <text x=\"{}\" y=\"26\" font-size=\"16\">{}</text>\n",
-        MARGIN[0],
-        escaped(title)
-    );
-    grid(&mut out, &x, &y);
+    let mut shapes = vec![Shape::Text(Text { font: Font::Heading, ..Text::new([MARGIN[0], 26.0], title) })];
+    grid(&mut shapes, &x, &y);
 
     let mut front: Vec<&Mark> = rows.iter().filter(|r| r.on_front).collect();
     front.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
     let front: Vec<[f64; 2]> = front.iter().map(|r| [x.at(r.seconds), y.at(r.psnr)]).collect();
-    let places: Vec<String> = front.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
-    let _ = writeln!(
-        out,
-        "<polyline points=\"{}\" fill=\"none\" stroke=\"{FRONT}\" stroke-width=\"1.5\"/>",
-        places.join(" ")
-    );
     let named: Vec<([f64; 2], &str)> =
         rows.iter().map(|r| ([x.at(r.seconds), y.at(r.psnr)], r.name)).collect();
     let names = labels::places(&named, &front, [x.from, y.to - 10.0, x.to, y.from]);
-    for (row, [name_x, name_y]) in rows.iter().zip(names) {
+    shapes.push(Shape::Path { points: front, color: FRONT });
+    for (row, name_at) in rows.iter().zip(names) {
         let color = if row.on_front { FRONT } else { BEHIND };
         let (at_x, at_y) = (x.at(row.seconds), y.at(row.psnr));
         let [y0, y1] = row.psnr_range.map(|v| y.at(v));
         let [x0, x1] = row.seconds_range.map(|v| x.at(v));
-        let _ = writeln!(
-            out,
-            "<path d=\"M{at_x:.1} {y0:.1}V{y1:.1}M{x0:.1} {at_y:.1}H{x1:.1}\" stroke=\"{color}\" \
-             stroke-opacity=\"0.4\"/>\n<circle cx=\"{at_x:.1}\" cy=\"{at_y:.1}\" r=\"4\" fill=\"{color}\"/>\n\
-             <text x=\"{name_x:.1}\" y=\"{name_y:.1}\" fill=\"{color}\">{}</text>",
-            escaped(row.name)
-        );
+        let spread = vec![[[at_x, y0], [at_x, y1]], [[x0, at_y], [x1, at_y]]];
+        shapes.push(Shape::Rules { ends: spread, color, opacity: 0.4 });
+        shapes.push(Shape::Dot { center: [at_x, at_y], color });
+        shapes.push(Shape::Text(Text { color, ..Text::new(name_at, row.name) }));
     }
-    out.push_str("</svg>\n");
-    Some(out)
+    Some(Drawing { size: SIZE, shapes })
 }
 
-fn grid(out: &mut String, x: &Axis, y: &Axis) {
+fn grid(shapes: &mut Vec<Shape>, x: &Axis, y: &Axis) {
+    let rule = |from, to| Shape::Rules { ends: vec![[from, to]], color: PALE, opacity: 1.0 };
+    let text = |at, anchor, color, text: String| Shape::Text(Text { anchor, color, ..Text::new(at, text) });
     for tick in x.ticks() {
         let at = x.at(tick);
-        let _ = writeln!(
-            out,
-            "<path d=\"M{at:.1} {:.1}V{:.1}\" stroke=\"#e5e7eb\"/>\n\
-             <text x=\"{at:.1}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"{GREY}\">{tick}</text>",
-            y.from,
-            y.to,
-            y.from + 18.0
-        );
+        shapes.push(rule([at, y.from], [at, y.to]));
+        shapes.push(text([at, y.from + 18.0], Anchor::Middle, GREY, tick.to_string()));
     }
     for tick in y.ticks() {
         let at = y.at(tick);
-        let _ = writeln!(
-            out,
-            "<path d=\"M{:.1} {at:.1}H{:.1}\" stroke=\"#e5e7eb\"/>\n\
-             <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" fill=\"{GREY}\">{tick:.1}</text>",
-            x.from,
-            x.to,
-            x.from - 8.0,
-            at + 4.5
-        );
+        shapes.push(rule([x.from, at], [x.to, at]));
+        shapes.push(text([x.from - 8.0, at + 4.5], Anchor::End, GREY, format!("{tick:.1}")));
     }
-    let _ = writeln!(
-        out,
-        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">seconds per reconstruction</text>\n\
-         <text transform=\"translate(18 {:.1}) rotate(-90)\" text-anchor=\"middle\">PSNR of the test views, dB</text>",
-        0.5 * (x.from + x.to),
-        y.from + 42.0,
-        0.5 * (y.from + y.to)
-    );
-}
-
-/// Escapes text for XML; control characters become escape sequences.
-fn escaped(text: &str) -> String {
-    let one = |c: char| match c {
-        '&' => "&amp;".into(),
-        '<' => "&lt;".into(),
-        '>' => "&gt;".into(),
-        c if shown::is_plain(c) => c.to_string(),
-        c => c.escape_default().to_string(),
-    };
-    text.chars().map(one).collect()
+    let seconds = Text::new([0.5 * (x.from + x.to), y.from + 42.0], "seconds per reconstruction");
+    shapes.push(Shape::Text(Text { anchor: Anchor::Middle, ..seconds }));
+    let psnr = Text::new([18.0, 0.5 * (y.from + y.to)], "PSNR of the test views, dB");
+    shapes.push(Shape::Text(Text { anchor: Anchor::Middle, direction: Direction::Up, ..psnr }));
 }
 
 #[cfg(test)]
@@ -189,10 +147,5 @@ mod tests {
         let y = Axis { low: 21.93, high: 24.1, from: 10.0, to: 0.0, is_log: false };
         assert_eq!(y.ticks().len(), 5);
         assert!((y.ticks()[0] - 22.0).abs() < 1e-9 && (y.at(21.93) - 10.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn names_cannot_break_the_picture() {
-        assert_eq!(escaped("a<b>&\u{1b}\n"), "a&lt;b&gt;&amp;\\u{1b}\\n");
     }
 }

@@ -201,8 +201,10 @@ fn explained(e: io::Error) -> io::Error {
 
 /// Maximum size of a file by the limits of this process, bytes.
 #[cfg(unix)]
-fn largest_file() -> Option<u64> {
-    rustix::process::getrlimit(rustix::process::Resource::Fsize).current
+fn largest_file() -> Option<nix::sys::resource::rlim_t> {
+    use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
+    let (limit, _) = getrlimit(Resource::RLIMIT_FSIZE).ok()?;
+    (limit != RLIM_INFINITY).then_some(limit)
 }
 
 #[cfg(not(unix))]

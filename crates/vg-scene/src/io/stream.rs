@@ -42,25 +42,33 @@ fn open_within(wait: Duration, path: &Path) -> Result<Stream> {
 #[cfg(unix)]
 fn open_without_waiting(path: &Path) -> std::io::Result<File> {
     use std::os::unix::fs::OpenOptionsExt;
-    let flags = rustix::fs::OFlags::NONBLOCK.bits();
-    File::options().read(true).custom_flags(flags as i32).open(path)
+    let flags = nix::fcntl::OFlag::O_NONBLOCK.bits();
+    File::options().read(true).custom_flags(flags).open(path)
 }
 
 /// Waits for a writer; returns the bytes that had to be read to detect it.
 #[cfg(unix)]
 fn begin_pipe(mut file: &File, path: &Path, wait: Duration) -> Result<Vec<u8>> {
-    use rustix::event::{PollFd, PollFlags, Timespec, poll};
-    use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
+    use nix::errno::Errno;
+    use nix::fcntl::{FcntlArg, OFlag, fcntl};
+    use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+    use std::os::fd::AsFd;
     use std::os::unix::fs::FileTypeExt;
     let io = |e| Error::io(path, e);
     if !file.metadata().map_err(io)?.file_type().is_fifo() {
         return Err(Error::format(path, "file", "is a device; allowed: a file or a pipe"));
     }
-    let time = Timespec::try_from(wait).map_err(|e| io(std::io::Error::other(e)))?;
+    let time = PollTimeout::try_from(wait).map_err(|e| io(std::io::Error::other(e)))?;
     let mut begun = Vec::new();
-    let mut fds = [PollFd::new(&file, PollFlags::IN)];
+    let mut fds = [PollFd::new(file.as_fd(), PollFlags::POLLIN)];
+    let ready = loop {
+        match poll(&mut fds, time) {
+            // A signal interrupted the wait.
+            Err(Errno::EINTR) => {}
+            ready => break ready.map_err(|e| io(e.into()))?,
+        }
+    };
     // After a timeout, the writer is either still at work or does not exist.
-    let ready = rustix::io::retry_on_intr(|| poll(&mut fds, Some(&time))).map_err(|e| io(e.into()))?;
     if ready == 0 {
         let mut byte = [0];
         match file.read(&mut byte) {
@@ -76,8 +84,9 @@ fn begin_pipe(mut file: &File, path: &Path, wait: Duration) -> Result<Vec<u8>> {
             Err(e) => return Err(io(e)),
         }
     }
-    let flags = fcntl_getfl(file).map_err(|e| io(e.into()))?;
-    fcntl_setfl(file, flags - OFlags::NONBLOCK).map_err(|e| io(e.into()))?;
+    let flags = fcntl(file, FcntlArg::F_GETFL).map_err(|e| io(e.into()))?;
+    let waiting = OFlag::from_bits_retain(flags) - OFlag::O_NONBLOCK;
+    fcntl(file, FcntlArg::F_SETFL(waiting)).map_err(|e| io(e.into()))?;
     Ok(begun)
 }
 

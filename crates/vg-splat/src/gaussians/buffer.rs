@@ -4,7 +4,8 @@ use super::sh;
 use std::ops::Range;
 use vg_geometry::{Error, Result};
 
-/// Smallest and largest stored standard deviation, metres. The smallest is the smallest normal f32.
+/// Smallest and largest stored standard deviation, metres: normal numbers, whose logarithm a file can hold. Heads keep to
+/// a range of their own.
 pub const SCALE_RANGE: std::ops::RangeInclusive<f32> = f32::MIN_POSITIVE..=1e9;
 
 /// Gaussians in the vehicle frame (x forward, y left, z up, metres), structure of arrays, f32.

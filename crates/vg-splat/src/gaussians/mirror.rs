@@ -79,6 +79,7 @@ fn mirror_colors(sh: &mut [f32], signs: &[f32]) {
 mod tests {
     use super::*;
     use glam::{DMat3, DQuat, DVec3};
+    use vg_geometry::MIRROR_Y;
 
     fn two() -> Gaussians {
         let q = DQuat::from_xyzw(0.3, -0.5, 0.1, 0.7).normalize();
@@ -112,7 +113,7 @@ mod tests {
     fn the_covariance_is_m_sigma_m() {
         let g = two();
         let mirrored = g.mirrored();
-        let m = DMat3::from_diagonal(DVec3::new(1.0, -1.0, 1.0));
+        let m = DMat3::from_diagonal(MIRROR_Y.as_dvec3());
         for i in 0..g.len() {
             let expected = m * covariance(g.rotations()[i], g.scales()[i]) * m;
             let found = covariance(mirrored.rotations()[i], mirrored.scales()[i]);

@@ -98,8 +98,7 @@ fn lifted(drawn: &Rendered, camera: &Camera) -> Vec<[f32; 3]> {
             if drawn.alpha[i] < ALPHA || ![i - 1, i + 1, i - w, i + w].iter().all(|&o| is_smooth(i, o)) {
                 continue;
             }
-            let [x, y] = camera.intrinsics.normalized_from_pixel([u as f64 + 0.5, v as f64 + 0.5]);
-            let p = DVec3::new(x, y, 1.0) * f64::from(drawn.depth[i]);
+            let p = camera.intrinsics.pixel_ray(u as u32, v as u32) * f64::from(drawn.depth[i]);
             points.push(camera.vehicle_from_camera.transform_point(p).as_vec3().to_array());
         }
     }

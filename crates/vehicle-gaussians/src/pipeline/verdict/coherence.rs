@@ -9,7 +9,7 @@ use crate::prior::volume::silhouette::central_ray;
 use crate::prior::volume::{Silhouette, whereabouts};
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
-use vg_geometry::Intrinsics;
+use vg_geometry::{Intrinsics, MIRROR_Y};
 use vg_scene::mask::Label;
 use vg_scene::{Mask, View};
 
@@ -175,7 +175,6 @@ impl Ray {
         middle: Vec3,
         radius: f32,
     ) -> Self {
-        const MIRROR: Vec3 = Vec3::new(1.0, -1.0, 1.0);
         let width = view.camera.width as usize;
         let at = |z: f32| view.lift((pixel % width) as u32, (pixel / width) as u32, z);
         let center = view.camera.center().as_vec3();
@@ -184,7 +183,7 @@ impl Ray {
         let reach = radius / step.length();
         let others = || carvers.iter().enumerate().filter(|(_, carver)| carver.index != index);
         let denied = |p: Vec3| others().fold(0u32, |bits, (k, c)| bits | (u32::from(c.denies(p)) << k));
-        let denied_mirrored = |p: Vec3| carvers.iter().any(|carver| carver.denies(p * MIRROR));
+        let denied_mirrored = |p: Vec3| carvers.iter().any(|carver| carver.denies(p * MIRROR_Y));
         let (mut meets, mut first, mut alone) = (false, None, 0);
         for k in 0..STEPS {
             let z = around + reach * (2.0 * (k as f32 + 0.5) / STEPS as f32 - 1.0);

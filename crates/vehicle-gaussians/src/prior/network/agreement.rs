@@ -135,9 +135,8 @@ fn pairs(views: &[View], depths: &[DepthMap]) -> Vec<Pair> {
             // Directly from camera to camera: the origin of the common frame may be kilometres away.
             let to_from = other.camera.vehicle_from_camera.inverse().after(&view.camera.vehicle_from_camera);
             for (u, v, z) in seen.iter().step_by(every) {
-                let [x, y] =
-                    view.camera.intrinsics.normalized_from_pixel([f64::from(*u) + 0.5, f64::from(*v) + 0.5]);
-                let place = to_from.transform_point(f64::from(*z) * DVec3::new(x, y, 1.0));
+                let ray = view.camera.intrinsics.pixel_ray(*u, *v);
+                let place = to_from.transform_point(f64::from(*z) * ray);
                 if let Some(found) = depth_towards(other, &depths[j], place)
                     && (found / place.z).max(place.z / found) < SAME
                 {

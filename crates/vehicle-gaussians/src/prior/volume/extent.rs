@@ -5,6 +5,7 @@ use super::silhouette::{Silhouette, central_ray};
 use crate::prior::{BoxSource, WorkingBox};
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
+use vg_geometry::MIRROR_Y;
 use vg_geometry::{Error, Result};
 use vg_scene::View;
 
@@ -131,7 +132,7 @@ fn half_width_at_the_wheels(low: DVec3, high: DVec3, inside: impl Fn(Vec3) -> f3
             (0..=columns).any(|i| {
                 let x = low.x + i as f64 * STEP_M;
                 let p = DVec3::new(x, y, z).as_vec3();
-                inside(p) > 0.0 && inside(Vec3::new(p.x, -p.y, p.z)) > 0.0
+                inside(p) > 0.0 && inside(p * MIRROR_Y) > 0.0
             })
         };
         (0..=rows).rev().map(|j| j as f64 * STEP_M).find(|&y| occupied(y)).unwrap_or(0.0)
@@ -233,5 +234,5 @@ pub fn inside_both(silhouettes: &[Silhouette], p: Vec3) -> f32 {
     if here < FAR_OUTSIDE_M {
         return here;
     }
-    here.min(inside_all(silhouettes, Vec3::new(p.x, -p.y, p.z)))
+    here.min(inside_all(silhouettes, p * MIRROR_Y))
 }

@@ -28,9 +28,6 @@ const TOUCHING_M: f32 = 0.005;
 /// Distance of a ray from the surface beyond which the mask is taken to be wrong, metres.
 const WRONG_M: f32 = 0.25;
 
-/// How far the surface may rise above the hull, metres: not at all.
-const SLACK_M: f32 = 0.0;
-
 /// Distance between the sampled pixels near the silhouette's edge, metres on the vehicle.
 const SAMPLE_M: f64 = 0.028;
 
@@ -88,7 +85,7 @@ pub(crate) fn fill_masks(field: &mut Field, hull: Option<&Field>, views: &[View]
     };
     let mut missed = passing(field, &rays, &samples);
     let uncovered_before = part(field, &missed);
-    let ceiling = hull.map(|hull| Ceiling { hull, slack: SLACK_M });
+    let ceiling = hull.map(|hull| Ceiling { hull, slack: 0.0 });
     for _ in 0..ROUNDS {
         if missed.is_empty() {
             break;

@@ -90,8 +90,7 @@ impl Rays {
 
     /// Direction of a pixel's ray, with z = 1 in the camera frame.
     fn direction(&self, u: usize, v: usize) -> Vec3 {
-        let [x, y] = self.intrinsics.normalized_from_pixel([u as f64 + 0.5, v as f64 + 0.5]);
-        self.rotation * Vec3::new(x as f32, y as f32, 1.0)
+        self.rotation * self.intrinsics.pixel_ray(u as u32, v as u32).as_vec3()
     }
 }
 

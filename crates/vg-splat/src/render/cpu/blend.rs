@@ -58,7 +58,7 @@ pub(super) fn blend<S: Lanes, R: Record>(
     max_alpha: f32,
     record: &mut R,
 ) {
-    let x = block_centers(origin[0]);
+    let place = Place { origin, x: block_centers(origin[0]) };
     let mut visible = [Entry::default(); BATCH];
     let mut splat_from_visible = [Splat::default(); BATCH];
     for batch in tile_entries.chunks(BATCH) {
@@ -75,10 +75,18 @@ pub(super) fn blend<S: Lanes, R: Record>(
             *splat = splats[entry.splat()];
         }
         for (entry, splat) in visible[..count].iter().zip(&splat_from_visible) {
-            blend_splat(simd, tile, origin, &x, *entry, splat, max_alpha, record);
+            blend_splat(simd, tile, &place, *entry, splat, max_alpha, record);
             record.splat(entry.splat());
         }
     }
+}
+
+/// Where a tile lies in the picture.
+struct Place {
+    /// Column and row of its first pixel.
+    origin: [usize; 2],
+    /// x of the pixel centres of each block.
+    x: [f32x8; BLOCKS],
 }
 
 /// Whether the splat may touch an unfinished pixel.
@@ -122,13 +130,13 @@ struct Footprint {
 fn blend_splat<S: Lanes, R: Record>(
     simd: S,
     tile: &mut Tile,
-    [left, top]: [usize; 2],
-    x: &[f32x8; BLOCKS],
+    Place { origin: [left, top], x }: &Place,
     entry: Entry,
     splat: &Splat,
     max_alpha: f32,
     record: &mut R,
 ) {
+    let (left, top) = (*left, *top);
     let [first_row, last_row] = entry.rows();
     let footprint = Footprint::new(simd, splat);
     let [red, green, blue] = splat.color;

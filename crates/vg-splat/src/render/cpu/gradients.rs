@@ -2,13 +2,13 @@
 
 use super::backward::{self, BackwardTimes};
 use super::simd::Lanes;
-use super::{CpuRenderer, Level, Scratch, StageTimes, Watched};
+use super::{CpuRenderer, Job, Level, Scratch, StageTimes, Watched};
 use crate::gaussians::Gaussians;
 use crate::render::{Differentiable, Gradients, PictureGradient, RenderOptions, Rendered};
 use std::time::{Duration, Instant};
 use vg_geometry::Camera;
 use vg_geometry::Result;
-use vg_geometry::progress::{UNWATCHED, Watch};
+use vg_geometry::progress::UNWATCHED;
 
 /// Wall time of each stage of a picture and its gradients.
 #[derive(Clone, Copy, Debug, Default)]
@@ -130,15 +130,11 @@ impl Watched<'_> {
     ) -> Result<GradientTimes> {
         let Self { renderer, watch } = *self;
         let mut scratch = renderer.pool().pop().unwrap_or_default();
-        let budget = renderer.pair_budget;
+        let job = Job { gaussians, camera, options, pair_budget: renderer.pair_budget, watch };
         let times = match renderer.level {
             #[cfg(target_arch = "x86_64")]
-            Level::Avx2(simd) => {
-                forward_backward(simd, gaussians, camera, options, budget, watch, &mut scratch, targets, loss)
-            }
-            Level::Portable(simd) => {
-                forward_backward(simd, gaussians, camera, options, budget, watch, &mut scratch, targets, loss)
-            }
+            Level::Avx2(simd) => forward_backward(simd, job, &mut scratch, targets, loss),
+            Level::Portable(simd) => forward_backward(simd, job, &mut scratch, targets, loss),
         };
         renderer.pool().push(scratch);
         watch.check()?;
@@ -150,28 +146,20 @@ impl Watched<'_> {
 /// magnitude.
 fn forward_backward<S: Lanes>(
     simd: S,
-    gaussians: &Gaussians,
-    camera: &Camera,
-    options: &RenderOptions,
-    pair_budget: u64,
-    watch: &Watch,
+    job: Job,
     scratch: &mut Scratch,
     (picture, picture_gradient, gradients): (&mut Rendered, &mut PictureGradient, &mut Gradients),
     loss: impl FnOnce(&Rendered, &mut PictureGradient) -> Result<f32>,
 ) -> Result<GradientTimes> {
-    let mut forward = super::prepare(simd, gaussians, camera, options, watch, scratch);
-    let binned =
-        super::blend_in_slices(simd, camera, options, pair_budget, watch, scratch, picture, &mut forward);
+    let mut forward = super::prepare(simd, job, scratch);
+    let listed = super::blend_in_slices(simd, job, scratch, picture, &mut forward);
     // The caller's function must not get an incomplete picture.
-    watch.check()?;
+    job.watch.check()?;
     let start = Instant::now();
     let largest = loss(picture, picture_gradient)?;
     let loss = start.elapsed();
     let given = (&*picture_gradient, largest);
-    let budget = pair_budget;
-    let backward = backward::backward(
-        simd, gaussians, camera, options, budget, watch, scratch, binned, given, gradients,
-    );
+    let backward = backward::backward(simd, job, scratch, Some(listed), given, gradients);
     Ok(GradientTimes { forward, loss, backward })
 }
 
@@ -223,15 +211,12 @@ impl Differentiable for Watched<'_> {
         }
         let Self { renderer, watch } = *self;
         let mut scratch = renderer.pool().pop().unwrap_or_default();
-        let (budget, given) = (renderer.pair_budget, (gradient, largest));
+        let job = Job { gaussians, camera, options, pair_budget: renderer.pair_budget, watch };
+        let given = (gradient, largest);
         match renderer.level {
             #[cfg(target_arch = "x86_64")]
-            Level::Avx2(simd) => {
-                backward_only(simd, gaussians, camera, options, budget, watch, &mut scratch, given, &mut out);
-            }
-            Level::Portable(simd) => {
-                backward_only(simd, gaussians, camera, options, budget, watch, &mut scratch, given, &mut out);
-            }
+            Level::Avx2(simd) => backward_only(simd, job, &mut scratch, given, &mut out),
+            Level::Portable(simd) => backward_only(simd, job, &mut scratch, given, &mut out),
         }
         renderer.pool().push(scratch);
         watch.check()?;
@@ -253,17 +238,13 @@ impl Differentiable for Watched<'_> {
 /// Computes the gradients without drawing the picture first.
 fn backward_only<S: Lanes>(
     simd: S,
-    gaussians: &Gaussians,
-    camera: &Camera,
-    options: &RenderOptions,
-    pair_budget: u64,
-    watch: &Watch,
+    job: Job,
     scratch: &mut Scratch,
     gradient: (&PictureGradient, f32),
     out: &mut Gradients,
 ) {
-    super::prepare(simd, gaussians, camera, options, watch, scratch);
-    backward::backward(simd, gaussians, camera, options, pair_budget, watch, scratch, false, gradient, out);
+    super::prepare(simd, job, scratch);
+    backward::backward(simd, job, scratch, None, gradient, out);
 }
 
 #[cfg(test)]

@@ -159,30 +159,50 @@ impl Renderer for CpuRenderer {
     }
 }
 
-fn draw<S: Lanes>(
-    simd: S,
-    gaussians: &Gaussians,
-    camera: &Camera,
-    options: &RenderOptions,
+/// What is drawn: a camera that is valid and has no lens.
+#[derive(Clone, Copy)]
+struct Job<'a> {
+    gaussians: &'a Gaussians,
+    camera: &'a Camera,
+    options: &'a RenderOptions,
     pair_budget: u64,
-    watch: &Watch,
-    scratch: &mut Scratch,
-    target: &mut Rendered,
-) -> StageTimes {
-    let mut times = prepare(simd, gaussians, camera, options, watch, scratch);
-    blend_in_slices(simd, camera, options, pair_budget, watch, scratch, target, &mut times);
+    watch: &'a Watch,
+}
+
+/// What every tile of a picture needs.
+#[derive(Clone, Copy)]
+struct TileJob<'a> {
+    stripes: &'a [Stripe],
+    splats: &'a [Splat],
+    options: &'a RenderOptions,
+    watch: &'a Watch,
+}
+
+/// Where a slice of the depth order lies in it.
+#[derive(Clone, Copy)]
+struct Slice {
+    is_first: bool,
+    is_last: bool,
+}
+
+/// What the stripes list once a picture is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Listed {
+    /// Every splat of the picture: it took one slice.
+    All,
+    /// Those of the last slice.
+    LastSlice,
+}
+
+fn draw<S: Lanes>(simd: S, job: Job, scratch: &mut Scratch, target: &mut Rendered) -> StageTimes {
+    let mut times = prepare(simd, job, scratch);
+    blend_in_slices(simd, job, scratch, target, &mut times);
     times
 }
 
 /// Computes the splats, their depth order, and their bounds in this order.
-fn prepare<S: Lanes>(
-    simd: S,
-    gaussians: &Gaussians,
-    camera: &Camera,
-    options: &RenderOptions,
-    watch: &Watch,
-    scratch: &mut Scratch,
-) -> StageTimes {
+fn prepare<S: Lanes>(simd: S, job: Job, scratch: &mut Scratch) -> StageTimes {
+    let Job { gaussians, camera, options, watch, .. } = job;
     let view = PinholeView::new(camera, options, gaussians.sh_degree());
     let start = Instant::now();
     project_all(simd, &view, gaussians, watch, scratch);
@@ -198,17 +218,15 @@ fn prepare<S: Lanes>(
     }
 }
 
-/// Draws the prepared splats. Returns whether one slice was enough, so that the stripes list the whole picture.
+/// Draws the prepared splats.
 fn blend_in_slices<S: Lanes>(
     simd: S,
-    camera: &Camera,
-    options: &RenderOptions,
-    pair_budget: u64,
-    watch: &Watch,
+    job: Job,
     scratch: &mut Scratch,
     target: &mut Rendered,
     times: &mut StageTimes,
-) -> bool {
+) -> Listed {
+    let Job { camera, options, pair_budget, watch, .. } = job;
     let grid = Grid::new(camera.width, camera.height);
     let Scratch { splats, splat_from_rank, bounds_from_rank, stripes, .. } = scratch;
     resize(target, camera.width, camera.height);
@@ -216,17 +234,18 @@ fn blend_in_slices<S: Lanes>(
     // Runs once for an empty scene too, to draw the background.
     loop {
         let begin = Instant::now();
-        let first = drawn == 0;
+        let is_first = drawn == 0;
         let slice = drawn..drawn + bin::slice_len(&bounds_from_rank[drawn..], pair_budget);
         drawn = slice.end;
-        let last = drawn == splat_from_rank.len();
+        let is_last = drawn == splat_from_rank.len();
         bin::bin(&grid.window(), &splat_from_rank[slice.clone()], &bounds_from_rank[slice], stripes);
         let binned = Instant::now();
-        let unfinished = blend_all(simd, grid, stripes, splats, options, watch, target, [first, last]);
+        let tiles = TileJob { stripes, splats, options, watch };
+        let unfinished = blend_all(simd, grid, tiles, target, Slice { is_first, is_last });
         times.bin += binned - begin;
         times.blend += binned.elapsed();
-        if last || watch.is_stopped() {
-            return first;
+        if is_last || watch.is_stopped() {
+            return if is_first { Listed::All } else { Listed::LastSlice };
         }
         if !unfinished {
             // Nothing farther is visible; an empty slice completes the picture.
@@ -281,16 +300,8 @@ fn resize(target: &mut Rendered, width: u32, height: u32) {
 }
 
 /// Blends one slice of the depth order into every tile, a band of rows per task. Returns whether a pixel is unfinished.
-fn blend_all<S: Lanes>(
-    simd: S,
-    grid: Grid,
-    stripes: &[Stripe],
-    splats: &[Splat],
-    options: &RenderOptions,
-    watch: &Watch,
-    target: &mut Rendered,
-    [first, last]: [bool; 2],
-) -> bool {
+fn blend_all<S: Lanes>(simd: S, grid: Grid, job: TileJob, target: &mut Rendered, slice: Slice) -> bool {
+    let TileJob { stripes, splats, options, watch } = job;
     let width = target.width as usize;
     let band = TILE_HEIGHT * width;
     let planes = target.color.par_chunks_mut(band).zip(target.alpha.par_chunks_mut(band));
@@ -304,7 +315,7 @@ fn blend_all<S: Lanes>(
         let stripe = bin::stripe_with_row(stripes, row);
         for column in 0..grid.columns {
             let x0 = column * TILE_WIDTH;
-            if first {
+            if slice.is_first {
                 tile.clear(&planes, x0);
             } else {
                 tile.load(&planes, x0);
@@ -317,7 +328,7 @@ fn blend_all<S: Lanes>(
                     blend::blend(simd, tile, origin, tile_entries, splats, options.max_alpha, &mut NoRecord);
                 },
             );
-            if last {
+            if slice.is_last {
                 tile.store_finished(&mut planes, x0, options);
             } else {
                 tile.store_unfinished(&mut planes, x0);

@@ -1,6 +1,6 @@
 //! The fast renderer with cancellation: once the work is stopped, the remaining rows and tiles are skipped.
 
-use super::{CpuRenderer, Level, StageTimes, draw};
+use super::{CpuRenderer, Job, Level, StageTimes, draw};
 use crate::gaussians::Gaussians;
 use crate::render::{RenderOptions, Rendered, Renderer};
 use vg_geometry::Camera;
@@ -40,13 +40,11 @@ impl Watched<'_> {
             return Ok(StageTimes::default());
         }
         let mut scratch = renderer.pool().pop().unwrap_or_default();
-        let budget = renderer.pair_budget;
+        let job = Job { gaussians, camera, options, pair_budget: renderer.pair_budget, watch };
         let times = match renderer.level {
             #[cfg(target_arch = "x86_64")]
-            Level::Avx2(simd) => draw(simd, gaussians, camera, options, budget, watch, &mut scratch, target),
-            Level::Portable(simd) => {
-                draw(simd, gaussians, camera, options, budget, watch, &mut scratch, target)
-            }
+            Level::Avx2(simd) => draw(simd, job, &mut scratch, target),
+            Level::Portable(simd) => draw(simd, job, &mut scratch, target),
         };
         renderer.pool().push(scratch);
         watch.check()?;

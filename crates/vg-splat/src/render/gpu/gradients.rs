@@ -216,7 +216,7 @@ impl GpuRenderer {
                 stages.list_pairs(counters, per, pair, depth_bits, window.tiles());
                 stages.sort_by_tile(per, pair, band, tile_bits);
             }
-            stages.back(frame, counters, per, pair, band, back, [depth_bits, tile_bits]);
+            stages.back(frame, counters, (per, pair), band, back, [depth_bits, tile_bits]);
             stages.read_back(counters, per, band, &readback, None);
             stages.read_backgrounds(back, window.tiles());
             let submission = stages.submit();
@@ -242,7 +242,7 @@ impl GpuRenderer {
                 frame.first_pair = first;
                 self.device.queue.write_buffer(&counters.frame, 0, bytemuck::bytes_of(frame));
                 let mut stages = Stages::new(&self.device, &self.kernels);
-                stages.back(frame, counters, per, pair, band, back, [depth_bits, tile_bits]);
+                stages.back(frame, counters, (per, pair), band, back, [depth_bits, tile_bits]);
                 stages.submit();
             }
             memory.return_readback(readback);

@@ -16,6 +16,7 @@ use super::super::blend::block_centers;
 use super::super::simd::Lanes;
 use super::super::splat::Splat;
 use super::super::tile::{BLOCK, BLOCKS, TILE_HEIGHT, TILE_WIDTH, Tile, lanes};
+use super::TileShare;
 use super::tape::Tape;
 use crate::render::{Background, DepthMode, PictureGradient, RenderOptions};
 use pulp::f32x8;
@@ -131,8 +132,7 @@ impl TileGradient {
         [left, top]: [usize; 2],
         splats: &[Splat],
         max_alpha: f32,
-        ids: &mut Vec<u32>,
-        sums: &mut Vec<SplatSums>,
+        share: &mut TileShare,
     ) {
         let x = block_centers(left);
         let max_alpha = simd.splat_f32s(max_alpha);
@@ -192,8 +192,8 @@ impl TileGradient {
             let [w, wt, ws, wtt, wts, wss, red, green, blue, depth] = sum;
             let first: [f32; 8] = pulp::cast(simd.sums([w, wt, ws, wtt, wts, wss, red, green]));
             let rest: [f32; 8] = pulp::cast(simd.sums([blue, depth, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO]));
-            ids.push(layer.splat);
-            sums.push([
+            share.splats.push(layer.splat);
+            share.sums.push([
                 first[0], first[1], first[2], first[3], first[4], first[5], first[6], first[7], rest[0],
                 rest[1],
             ]);

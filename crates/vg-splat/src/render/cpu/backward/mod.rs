@@ -10,11 +10,10 @@ mod color;
 mod project;
 mod tape;
 
-use super::bin::{self, Grid, Stripe, Window};
+use super::bin::{self, Grid, Window};
 use super::simd::Lanes;
-use super::splat::Splat;
 use super::tile::{TILE_HEIGHT, TILE_WIDTH, Tile};
-use super::{PROJECT_CHUNK, Scratch};
+use super::{Job, Listed, PROJECT_CHUNK, Scratch, TileJob};
 use crate::gaussians::Gaussians;
 use crate::render::view::PinholeView;
 use crate::render::{Gradients, PictureGradient, PoseGradient, RenderOptions};
@@ -28,7 +27,6 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tape::Tape;
 use vg_geometry::Camera;
-use vg_geometry::progress::Watch;
 
 /// Maximum number of (tile, splat) pairs whose gradients are held at a time: 184 MB if all of them draw.
 const PAIR_BUDGET: u64 = 1 << 22;
@@ -74,20 +72,17 @@ struct Worker {
     gradient: TileGradient,
 }
 
-/// Computes the gradients of the splats projected and sorted into `scratch`; `binned` means that its stripes list the
-/// whole picture. `largest` is the largest magnitude in `gradient`. After a stop the contents of `out` are unspecified.
+/// Computes the gradients of the splats projected and sorted into `scratch`; `listed` tells what its stripes list, if a
+/// picture was drawn. `largest` is the largest magnitude in `gradient`. After a stop the contents of `out` are unspecified.
 pub(super) fn backward<S: Lanes>(
     simd: S,
-    gaussians: &Gaussians,
-    camera: &Camera,
-    options: &RenderOptions,
-    pair_budget: u64,
-    watch: &Watch,
+    job: Job,
     scratch: &mut Scratch,
-    binned: bool,
+    listed: Option<Listed>,
     (gradient, largest): (&PictureGradient, f32),
     out: &mut Gradients,
 ) -> BackwardTimes {
+    let Job { gaussians, camera, options, pair_budget, watch } = job;
     let scale = gradient_scale(largest);
     let grid = Grid::new(camera.width, camera.height);
     let Scratch { splats, splat_from_rank, bounds_from_rank, stripes, backward, .. } = scratch;
@@ -101,10 +96,11 @@ pub(super) fn backward<S: Lanes>(
     let whole = windows.len() == 1;
     for window in windows {
         let start = Instant::now();
-        if !(whole && binned) {
+        if !(whole && listed == Some(Listed::All)) {
             bin::bin(&window, splat_from_rank, bounds_from_rank, stripes);
         }
-        walk_tiles(simd, &window, stripes, splats, options, gradient, scale, watch, workers, tiles);
+        let tile_job = TileJob { stripes, splats, options, watch };
+        walk_tiles(simd, &window, tile_job, (gradient, scale), workers, tiles);
         if watch.is_stopped() {
             return times;
         }
@@ -170,15 +166,12 @@ pub(in crate::render) fn gradient_scale(largest: f32) -> f64 {
 fn walk_tiles<S: Lanes>(
     simd: S,
     window: &Window,
-    stripes: &[Stripe],
-    splats: &[Splat],
-    options: &RenderOptions,
-    gradient: &PictureGradient,
-    scale: f64,
-    watch: &Watch,
+    job: TileJob,
+    (gradient, scale): (&PictureGradient, f64),
     workers: &Mutex<Vec<Box<Worker>>>,
     tiles: &mut Vec<TileShare>,
 ) {
+    let TileJob { stripes, splats, options, watch } = job;
     let columns = window.columns.len();
     tiles.resize_with(window.rows.len() * columns, TileShare::default);
     tiles.par_iter_mut().with_max_len(1).enumerate().for_each(|(i, share)| {
@@ -192,22 +185,21 @@ fn walk_tiles<S: Lanes>(
         let spare = pool().pop();
         let mut worker = spare.unwrap_or_else(Worker::new);
         let Worker { tile, tape, gradient: behind } = &mut *worker;
-        let TileShare { splats: ids, sums, background } = share;
-        ids.clear();
-        sums.clear();
+        share.splats.clear();
+        share.sums.clear();
         tape.clear();
         tile.clear_part(gradient.width as usize - origin[0], gradient.height as usize - origin[1]);
         simd.vectorize(
             #[inline(always)]
             || super::blend::blend(simd, tile, origin, tile_entries, splats, options.max_alpha, tape),
         );
-        *background = simd.vectorize(
+        share.background = simd.vectorize(
             #[inline(always)]
             || behind.start((tile, tape), origin, options, gradient, scale),
         );
         simd.vectorize(
             #[inline(always)]
-            || behind.walk(simd, tape, origin, splats, options.max_alpha, ids, sums),
+            || behind.walk(simd, tape, origin, splats, options.max_alpha, share),
         );
         pool().push(worker);
     });
