@@ -12,7 +12,6 @@ use std::ptr::null_mut;
 use vg_face::capi::*;
 
 #[path = "../../tests/abi/arguments/calls.rs"]
-#[allow(dead_code)]
 mod calls;
 
 /// No guard bytes: the address sanitizer guards to the byte.

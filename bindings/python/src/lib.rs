@@ -5,6 +5,9 @@
 //!   affect the child process.
 //! * Every error is a `VgError`, also after a panic, or a `TypeError` for the wrong kind of object.
 
+// Python's functions have many keyword arguments, which PyO3 hands over by value.
+#![allow(clippy::too_many_arguments, clippy::needless_pass_by_value)]
+
 mod align;
 mod arrays;
 mod camera;

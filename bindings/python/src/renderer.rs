@@ -93,7 +93,7 @@ impl Renderer {
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let options = options(background, antialiased, [near, far], sh_degree)?;
-        let cameras: Vec<_> = cameras.iter().map(|camera| camera.get().inner.clone()).collect();
+        let cameras: Vec<_> = cameras.iter().map(|camera| camera.get().inner).collect();
         let mut drawn = Vec::with_capacity(cameras.len());
         watched(py, threads, "render", progress, |watch| {
             self.ready.render_each_watched(&cameras, &options, &mut Rgba8::default(), watch, |_, picture| {
