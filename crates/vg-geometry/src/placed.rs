@@ -109,7 +109,7 @@ impl Default for Turntable {
 
 impl Turntable {
     /// `count` cameras on a circle around the box from `low` to `high`, metres, vehicle frame: the first in front, the
-    /// next towards the left, each with the whole box in its picture. [`Gaussians::bounds`](crate::Gaussians::bounds)
+    /// next towards the left, each with the whole box in its picture. `Gaussians::bounds`
     /// returns the box of a model.
     ///
     /// # Errors

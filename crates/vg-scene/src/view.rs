@@ -30,7 +30,7 @@ pub struct Scene {
     pub views: Vec<View>,
     /// Points measured on the vehicle, if any; priors that estimate the surface move it to these points.
     pub cloud: Option<Cloud>,
-    /// The vehicle's box, if it was tracked or measured; [`crate::pipeline::Options::vehicle_size`] takes precedence.
+    /// The vehicle's box, if it was tracked or measured; `Options::vehicle_size` takes precedence.
     pub vehicle_box: Option<VehicleBox>,
 }
 

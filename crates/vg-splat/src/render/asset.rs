@@ -56,8 +56,8 @@ struct OnDevice {
 impl AssetRenderer {
     /// Chooses the backend, and copies the Gaussians to the device where that is the choice.
     ///
-    /// Errors, for [`Backend::Gpu`] alone: [`NotBuilt`](crate::Error::NotBuilt) in a build without the feature `gpu`,
-    /// [`Missing`](crate::Error::Missing) without a driver, [`Argument`](crate::Error::Argument) for more Gaussians
+    /// Errors, for [`Backend::Gpu`] alone: [`NotBuilt`](vg_geometry::Error::NotBuilt) in a build without the feature `gpu`,
+    /// [`Missing`](vg_geometry::Error::Missing) without a driver, [`Argument`](vg_geometry::Error::Argument) for more Gaussians
     /// than fit the device.
     pub fn new(gaussians: Arc<Gaussians>, backend: Backend) -> Result<Self> {
         let cpu = CpuRenderer::new();
@@ -100,7 +100,7 @@ impl AssetRenderer {
     /// As [`AssetRenderer::render`], into a picture whose memory is reused: planes, or 8 bits, which are less to fetch
     /// from a device.
     ///
-    /// Errors of the device ([`Missing`](crate::Error::Missing)) end the call, but not under [`Backend::Auto`]: there
+    /// Errors of the device ([`Missing`](vg_geometry::Error::Missing)) end the call, but not under [`Backend::Auto`]: there
     /// the CPU draws this picture and all further ones.
     pub fn render_into<P: Picture>(
         &self,

@@ -7,7 +7,7 @@ use vg_geometry::Camera;
 use vg_geometry::Result;
 use vg_geometry::progress::Watch;
 
-/// A renderer whose pictures can be cancelled: with [`Error::Cancelled`](crate::Error::Cancelled), and unspecified
+/// A renderer whose pictures can be cancelled: with [`Error::Cancelled`](vg_geometry::Error::Cancelled), and unspecified
 /// contents of the target.
 #[derive(Clone, Copy, Debug)]
 pub struct Watched<'a> {
