@@ -292,7 +292,6 @@ impl vg_options {
             resolution: self.resolution,
             max_views: (self.max_views != 0).then_some(self.max_views),
             max_gaussians: (self.max_gaussians != 0).then_some(self.max_gaussians),
-            baseline: None,
             ignore_offset: false,
             points: read::flag("options.points", self.points)?,
             threads: 0,

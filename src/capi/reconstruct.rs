@@ -66,8 +66,8 @@ unsafe fn run(
         }
         unsafe { callback.report(at) }
     };
-    let mut made = pipeline::reconstruct_on(&context.threads, scene, settings, &mut progress)?;
-    made.report.settings.threads = context.threads.count();
+    let settings = pipeline::Options { threads: context.threads.count(), ..settings.clone() };
+    let made = pipeline::reconstruct_on(&context.threads, scene, &settings, &mut progress)?;
     unsafe { log(Log { callback: options.log, user: options.log_user }, &made.report) };
     Ok(made)
 }

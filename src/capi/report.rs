@@ -29,7 +29,7 @@ impl ReportObject {
             .unwrap_or_else(|e| format!("{{\"error\": {:?}}}", e.to_string()));
         let reasons = report.verdict_reasons.iter().map(|r| c_string(one_line(&r.to_string()))).collect();
         // The text contains the models' paths; a report must not keep a network's memory alive.
-        (report.settings.prior_model, report.settings.head_model) = (None, None);
+        report.settings.release_models();
         Self { report, json: c_string(json), reasons, points: points.unwrap_or_default() }
     }
 

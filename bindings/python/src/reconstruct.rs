@@ -87,7 +87,6 @@ pub(crate) fn reconstruct<'py>(
         threads,
         points,
         refine: refinement(py, refine_iterations, refine_seconds, refine_hold_out, refine_backend)?,
-        baseline: None,
         ignore_offset: false,
     };
     // Checked before the pixels are copied.

@@ -22,7 +22,6 @@ pub mod metrics;
 pub mod pipeline;
 pub mod prior;
 pub mod refine;
-pub mod relight;
 pub mod segment;
 pub mod symmetry;
 
@@ -32,6 +31,7 @@ pub mod scene {
     pub use vg_scene::*;
 }
 
+pub use symmetry::relight;
 pub use vg_geometry::{self as geometry, Camera, Error, Pose, Result, error, progress, threads};
 pub use vg_scene::{Scene, View, io, onnx};
 pub use vg_splat::{Gaussians, gaussians, render};

@@ -1,9 +1,9 @@
 //! Promises of the baseline, on an ellipsoid with known geometry.
 
 use std::ops::ControlFlow;
-use vg::pipeline::{Options, PriorChoice, Reconstruction, reconstruct};
+use vg::pipeline::{BaselineRun, Method, Reconstruction};
 use vg::refine::baseline::BaselineOptions;
-use vg::refine::{Amount, Densify, RefineOptions, Stop};
+use vg::refine::{Amount, Densify, Stop};
 use vg::scene::Cloud;
 use vg::symmetry::SymmetryMode;
 use vg::{Error, Scene};
@@ -13,16 +13,17 @@ fn steps(n: u32) -> BaselineOptions {
     BaselineOptions { amount: Amount::Iterations(n), points: 1_500, ..BaselineOptions::default() }
 }
 
-fn options(baseline: BaselineOptions) -> Options {
-    Options { baseline: Some(baseline), threads: 2, ..Options::default() }
+fn options(baseline: BaselineOptions) -> BaselineRun {
+    BaselineRun { baseline, threads: 2, ..BaselineRun::default() }
 }
 
-fn run(scene: &Scene, options: &Options) -> Reconstruction {
-    reconstruct(scene, options, &mut |_| ControlFlow::Continue(())).unwrap()
+fn run(scene: &Scene, options: &BaselineRun) -> Reconstruction {
+    Method::from(options.clone()).reconstruct(scene, &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
-fn refusal(scene: &Scene, options: &Options) -> String {
-    reconstruct(scene, options, &mut |_| ControlFlow::Continue(())).unwrap_err().to_string()
+fn refusal(scene: &Scene, options: &BaselineRun) -> String {
+    let made = Method::from(options.clone()).reconstruct(scene, &mut |_| ControlFlow::Continue(()));
+    made.unwrap_err().to_string()
 }
 
 /// The scene with `n` points of the vehicle's surface, and one far outside.
@@ -58,8 +59,9 @@ fn input_views_are_learned_from_a_random_start() {
 #[test]
 fn any_number_of_threads_gives_the_same_bytes_and_another_seed_does_not() {
     let scene = right_side(48, 36);
-    let of =
-        |threads, seed| run(&scene, &Options { threads, ..options(BaselineOptions { seed, ..steps(130) }) });
+    let of = |threads, seed| {
+        run(&scene, &BaselineRun { threads, ..options(BaselineOptions { seed, ..steps(130) }) })
+    };
     let (one, four) = (of(1, 0), of(4, 0));
     assert!(one.gaussians == four.gaussians);
     assert_eq!(one.report.refinement, four.report.refinement);
@@ -114,27 +116,12 @@ fn one_view_is_enough() {
 }
 
 #[test]
-fn options_that_a_baseline_lacks_are_refused_by_name() {
+fn bad_settings_are_refused_by_their_names() {
     let scene = right_side(48, 36);
     let plain = options(steps(1));
-    let bad: [(Options, &str); 10] = [
-        (
-            Options { prior: PriorChoice::Given, ..plain.clone() },
-            "options.prior: given, with a baseline; allowed: auto",
-        ),
-        (
-            Options { symmetry: SymmetryMode::Always, ..plain.clone() },
-            "options.symmetry: always, with a baseline; allowed: auto or never",
-        ),
-        (
-            Options { refine: Some(RefineOptions::default()), ..plain.clone() },
-            "options.refine: a refinement, with",
-        ),
-        (
-            Options { budget_s: Some(1.0), ..plain.clone() },
-            "options.budget_s: 1 s, with a baseline; allowed: none",
-        ),
-        (Options { points: true, ..plain.clone() }, "options.points: true, with a baseline; allowed: false"),
+    let bad: [(BaselineRun, &str); 7] = [
+        (BaselineRun { resolution: 0.0, ..plain.clone() }, "options.resolution: 0; allowed: above 0"),
+        (BaselineRun { max_views: Some(0), ..plain.clone() }, "options.max_views: 0; allowed: at least 1"),
         (
             options(BaselineOptions { points: 0, ..steps(1) }),
             "options.baseline.points: 0; allowed: 1 to 300000",
@@ -171,7 +158,8 @@ fn options_that_a_baseline_lacks_are_refused_by_name() {
 #[test]
 fn a_caller_can_stop_it() {
     let mut losses = Vec::new();
-    let stopped = reconstruct(&right_side(48, 36), &options(steps(1_000)), &mut |progress| {
+    let method = Method::Baseline(options(steps(1_000)));
+    let stopped = method.reconstruct(&right_side(48, 36), &mut |progress| {
         losses.extend(progress.loss);
         if losses.len() > 3 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });

@@ -16,6 +16,7 @@ fn estimate(scene: &Scene, size: Option<[f64; 3]>) -> Geometry {
     HullPrior { known_box, ..HullPrior::default() }
         .estimate(&scene.views, &Context::new(&threads, &mut proceed))
         .unwrap()
+        .geometry
 }
 
 /// Depth of the hull minus true depth, pixel by pixel, for view i.
@@ -232,8 +233,9 @@ fn measured_points_correct_the_hull_and_points_outside_it_are_counted() {
             .unwrap()
     };
     let (corrected, plain) = (of(&with), of(&views));
-    assert!(error(&corrected) < 0.6 * error(&plain), "{} {}", error(&corrected), error(&plain));
-    let fit = corrected.points.unwrap();
+    let (bent, unbent) = (error(&corrected.geometry), error(&plain.geometry));
+    assert!(bent < 0.6 * unbent, "{bent} {unbent}");
+    let fit = corrected.report.points.unwrap();
     assert!(fit.outside >= 30 && fit.used + fit.outside == 430 && fit.after_m < 0.01, "{fit:?}");
 
     let report = run(&with, None).report;

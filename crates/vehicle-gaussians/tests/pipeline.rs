@@ -376,7 +376,7 @@ fn the_size_of_a_model_is_bounded_by_its_masks_before_the_work() {
         assert!(left_out(&made, &format!("max_gaussians, {cap}: the views are resampled to 0.")) > 0);
         assert!(left_out(&made, "averaged into fewer") > 0);
         // Repeated with the settings of the report, which hold the requested options.
-        assert_eq!(made.report.settings.resolution, 1.0);
+        assert_eq!(made.report.settings.vehicle().unwrap().resolution, 1.0);
     }
     let error = error(&scene, &Options { max_gaussians: Some(1), ..Options::default() });
     assert!(error.contains("options.max_gaussians: 1, where the masks allow for"), "{error}");
@@ -819,7 +819,7 @@ fn a_huge_budget_changes_no_byte_and_no_setting() {
     let free = run(&scene, &Options::default());
     let made = run(&scene, &Options { budget_s: Some(1e6), ..Options::default() });
     assert!(made.gaussians == free.gaussians);
-    assert_eq!(made.report.settings, Options::default());
+    assert_eq!(made.report.settings, Options::default().into());
     assert_eq!(made.report.left_out, free.report.left_out);
     let plan = made.report.plan.clone().unwrap();
     assert!(plan.fits && plan.budget_s == 1e6 && plan.predicted_s > 0.0 && plan.machine.serial > 0.0);
@@ -862,9 +862,10 @@ fn the_settings_that_a_budget_chose_give_the_same_bytes_without_it() {
     for part in [0.8, 0.5, 0.3, 0.1, 1e-4] {
         let budget_s = Some(part * full.predicted_s);
         let chosen = run(&scene, &Options { budget_s, points: true, ..Options::default() });
-        assert_ne!(chosen.report.settings, Options { points: true, ..Options::default() }, "{part}");
-        assert_eq!(chosen.report.settings.budget_s, None);
-        let again = run(&scene, &chosen.report.settings);
+        let settings = chosen.report.settings.vehicle().unwrap();
+        assert_ne!(*settings, Options { points: true, ..Options::default() }, "{part}");
+        assert_eq!(settings.budget_s, None);
+        let again = run(&scene, settings);
         assert!(again.gaussians == chosen.gaussians && again.points == chosen.points, "{part}");
         assert_eq!(again.report.settings, chosen.report.settings);
         assert_eq!(again.report.input_error, chosen.report.input_error);

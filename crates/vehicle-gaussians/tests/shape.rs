@@ -2,17 +2,21 @@
 
 use std::ops::ControlFlow;
 use vg::pipeline::{Options, PriorChoice, Reconstruction};
-use vg::prior::{DepthPrior, Geometry, HullPrior, ShapePrior};
+use vg::prior::{DepthPrior, Estimate, Geometry, HullPrior, ShapePrior};
 use vg::progress::{Context, Threads};
 use vg::scene::mask::Label;
 use vg::scene::{Mask, Scene, View};
 use vg_testing::sample::{self, INPUTS, UNSEEN};
 use vg_testing::vehicle::{right_side, without_depth};
 
-fn estimate(prior: &dyn DepthPrior, views: &[View]) -> Geometry {
+fn answer(prior: &dyn DepthPrior, views: &[View]) -> Estimate {
     let mut proceed = |_| ControlFlow::Continue(());
     let threads = Threads::new(2).unwrap();
     prior.estimate(views, &Context::new(&threads, &mut proceed)).unwrap()
+}
+
+fn estimate(prior: &dyn DepthPrior, views: &[View]) -> Geometry {
+    answer(prior, views).geometry
 }
 
 fn shape(photo: bool) -> ShapePrior {
@@ -56,7 +60,7 @@ fn the_unseen_side_of_the_sample_improves_without_a_depth_file() {
 #[test]
 fn every_vehicle_pixel_has_depth_with_a_confidence_and_masks_are_filled() {
     let scene = sample::open(&INPUTS, false).unwrap();
-    let geometry = estimate(&shape(true), &scene.views);
+    let Estimate { geometry, report } = answer(&shape(true), &scene.views);
     for (view, depth) in scene.views.iter().zip(&geometry.depths) {
         let labels = view.mask.as_ref().unwrap().labels();
         let confidence = depth.confidence().unwrap();
@@ -65,7 +69,7 @@ fn every_vehicle_pixel_has_depth_with_a_confidence_and_masks_are_filled() {
             assert_eq!(*z > 0.0, *c > 0.0 && *c <= 1.0, "depth {z}, confidence {c}");
         }
     }
-    assert!(geometry.masks.unwrap().uncovered_after < 0.01, "{:?}", geometry.masks);
+    assert!(report.masks.unwrap().uncovered_after < 0.01, "{:?}", report.masks);
 }
 
 #[test]
@@ -137,8 +141,8 @@ fn with_tower(scene: &Scene) -> Scene {
 #[test]
 fn parts_unlike_the_training_data_are_kept_if_the_masks_show_them() {
     let scene = with_tower(&without_depth(right_side(320, 240)));
-    let geometry = estimate(&shape(true), &scene.views);
-    assert!(geometry.masks.unwrap().uncovered_after < 0.03, "{:?}", geometry.masks);
+    let Estimate { geometry, report } = answer(&shape(true), &scene.views);
+    assert!(report.masks.unwrap().uncovered_after < 0.03, "{:?}", report.masks);
     // Lifted pixels of the tower lie above the roof, near the middle.
     let (view, depth) = (&scene.views[1], &geometry.depths[1]);
     let mut seen = 0;

@@ -37,7 +37,7 @@ pub(crate) fn run(args: &DemoArgs) -> Result {
         Options { prior: PriorChoice::Shape, threads: args.threads, points: true, ..Options::default() };
     let threads = Threads::new(args.threads)?;
     let inputs = scene::open(&scene_folder, &split.input, &without_depth, &threads)?;
-    let made = reconstruct::reconstruct(&inputs.scene, &shape, &threads)?;
+    let made = reconstruct::reconstruct(&inputs.scene, &shape.clone().into(), &threads)?;
 
     let tests = scene::open(&scene_folder, &split.test, &without_depth, &threads)?;
     let (drawn, mut measured) = measure::judge(&made.gaussians, &tests.scene.views, &threads)?;
@@ -58,9 +58,9 @@ pub(crate) fn run(args: &DemoArgs) -> Result {
     ];
     contact::write(&sheet, &rows)?;
 
-    let given = Options { prior: PriorChoice::Given, ..shape.clone() };
+    let given = Options { prior: PriorChoice::Given, ..shape };
     let input = MethodInput::plain(&scene_folder, &without_depth);
-    let bound = measure::split(&input, &split, &given, &References::default(), &threads)?;
+    let bound = measure::split(&input, &split, &given.into(), &References::default(), &threads)?;
     Ok(Outcome::done(text(folder, &split, &measured, &bound)))
 }
 

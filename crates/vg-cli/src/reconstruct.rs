@@ -9,7 +9,7 @@ use crate::{cloud, files, interrupt, scene, shown};
 use std::path::Path;
 use vg::io::{ply, vehicle_frame};
 use vg::onnx::Model;
-use vg::pipeline::{self, CheckedView, InputError, Options, Reconstruction, Report, Verdict};
+use vg::pipeline::{self, CheckedView, InputError, Method, Reconstruction, Report, Verdict};
 use vg::progress::Threads;
 use vg::scene::Segmenter;
 use vg::{Scene, View, io};
@@ -39,8 +39,12 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
     let mut opened = scene::load(index, &threads)?;
     let masks_by = fill_masks(args, &mut opened.scene.views, &threads)?;
     opened.scene.cloud = args.method.cloud.as_deref().map(cloud::read).transpose()?;
-    let settings = Options { points: args.points.is_some(), check: !args.no_check, ..args.method.options()? };
-    let made = reconstruct(&opened.scene, &settings, &threads)?;
+    let mut method = args.method.method()?;
+    match &mut method {
+        Method::Vehicle(options) => (options.points, options.check) = (args.points.is_some(), !args.no_check),
+        Method::Baseline(run) => run.check = !args.no_check,
+    }
+    let made = reconstruct(&opened.scene, &method, &threads)?;
     note_warnings(&made.report);
     accept(&made.report, &args.strict)?;
     files::write(&args.output, |out| ply::write_to(out, &made.gaussians))?;
@@ -111,9 +115,9 @@ fn fill_masks(args: &ReconstructArgs, views: &mut [View], threads: &Threads) -> 
 }
 
 /// Reconstructs with a progress bar on a terminal.
-pub(crate) fn reconstruct(scene: &Scene, options: &Options, threads: &Threads) -> Result<Reconstruction> {
+pub(crate) fn reconstruct(scene: &Scene, method: &Method, threads: &Threads) -> Result<Reconstruction> {
     let bar = Bar::for_reconstruction();
-    Ok(pipeline::reconstruct_on(threads, scene, options, &mut |progress| bar.show(progress))?)
+    Ok(method.reconstruct_on(threads, scene, &mut |progress| bar.show(progress))?)
 }
 
 /// Summary of the reconstruction on one line.

@@ -1,5 +1,6 @@
 //! Front and back if the shape is ambiguous: a person decides by one photograph.
 
+use super::WorldView;
 use glam::DVec3;
 use vg_geometry::Similarity;
 use vg_geometry::{Error, Result};
@@ -24,7 +25,7 @@ const ABEAM: f64 = 0.3;
 /// change if front and back are exchanged. `center` is the vehicle's middle, vehicle frame.
 pub(super) fn heading_view<'a>(views: &'a [View], s: &Similarity, center: DVec3) -> Option<(&'a str, bool)> {
     let forward = |view: &View| {
-        let seen = s.transform_point(view.camera.center()) - center;
+        let seen = s.transform_point(WorldView(view).camera_center()) - center;
         seen.x / seen.truncate().length()
     };
     let oblique = views.iter().filter(|view| forward(view).abs() > ABEAM);

@@ -25,9 +25,26 @@ pub use to_scan::{LEAST_CONFIDENCE, ScanAlignment, to_scan, to_scan_watched};
 use glam::DVec3;
 use rayon::prelude::*;
 use silhouettes::Outline;
+use vg_geometry::Pose;
 use vg_geometry::{Error, Result};
 use vg_scene::View;
 use vg_scene::undistort::undistorted;
+
+/// A view whose camera is posed in the world: callers put that pose into the field for the vehicle frame, which is still
+/// to be found.
+#[derive(Clone, Copy)]
+struct WorldView<'a>(&'a View);
+
+impl WorldView<'_> {
+    fn world_from_camera(&self) -> Pose {
+        self.0.camera.vehicle_from_camera
+    }
+
+    /// Place of the camera in the world.
+    fn camera_center(&self) -> DVec3 {
+        self.world_from_camera().translation
+    }
+}
 
 /// Minimum of masks that determines scale and position.
 pub const FEWEST_VIEWS: usize = 3;
@@ -46,7 +63,7 @@ const FEWEST_EDGES: usize = 60;
 fn outlines(views: &[View]) -> Result<Vec<Outline>> {
     let outline = |view: &View| {
         let view = undistorted(view)?;
-        Ok(view.mask.as_ref().map(|mask| Outline::new(&view, mask)))
+        Ok(view.mask.as_ref().map(|mask| Outline::new(&WorldView(&view), mask)))
     };
     let all: Vec<Option<Outline>> = views.par_iter().map(outline).collect::<Result<_>>()?;
     let seen: Vec<Outline> = all.into_iter().flatten().filter(|o| o.edge_count() > 0).collect();

@@ -4,13 +4,14 @@
 //! concavities but works from any start. The fine one runs along the mask's edge (the outermost projected point
 //! next to each piece of edge): it resolves bonnets and windscreens but needs a close start.
 
+use super::WorldView;
 use super::scan::Scan;
 use super::solve::{Numbers, System, slope};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use vg_geometry::{Intrinsics, Pose, Similarity};
+use vg_scene::Mask;
 use vg_scene::mask::Label;
-use vg_scene::{Mask, View};
 
 /// The number of directions of the support functions.
 const DIRECTIONS: usize = 32;
@@ -61,16 +62,14 @@ pub(super) struct Outline {
 }
 
 impl Outline {
-    /// The outline of a mask in an undistorted view whose camera is posed in the world.
-    pub(super) fn new(view: &View, mask: &Mask) -> Self {
-        let (width, height) = (mask.width() as usize, mask.height() as usize);
-        let labels = mask.labels().to_vec();
+    /// The outline of a mask of an undistorted view.
+    pub(super) fn new(view: &WorldView, mask: &Mask) -> Self {
         let mut outline = Self {
-            world_from_camera: view.camera.vehicle_from_camera,
-            intrinsics: view.camera.intrinsics,
-            width,
-            height,
-            labels,
+            world_from_camera: view.world_from_camera(),
+            intrinsics: view.0.camera.intrinsics,
+            width: mask.width() as usize,
+            height: mask.height() as usize,
+            labels: mask.labels().to_vec(),
             support: Vec::new(),
             edges: Vec::new(),
             open: Vec::new(),

@@ -1,5 +1,5 @@
-//! The best reconstruction that fits into the caller's time: candidates in order of expected quality, the first whose
-//! predicted time fits. What is chosen are ordinary options, so that a run can be repeated exactly without a budget.
+//! The best reconstruction within the caller's time: of candidates in order of expected quality, the first whose
+//! predicted time fits. The choice is ordinary options, so a run can be repeated exactly without a budget.
 
 use super::cost::{self, Load};
 use super::machine::Machine;
@@ -12,36 +12,36 @@ use std::time::Duration;
 use vg_geometry::progress::Context;
 use vg_scene::Scene;
 
-/// Part of the budget that predictions may fill: the rest is for what they do not know.
+/// Part of the budget that predictions may fill; the rest covers their error.
 const FILLED: f64 = 0.85;
 
-/// What the budget led to.
+/// How a budget was resolved.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BudgetPlan {
-    /// The caller's, seconds.
+    /// The caller's budget, seconds.
     pub budget_s: f64,
-    /// For what was chosen, from the start of the call, seconds.
+    /// Predicted time of the chosen settings, from the start of the call, seconds.
     pub predicted_s: f64,
-    /// Whether that leaves enough room in the budget; if not, the fastest settings were chosen.
+    /// Whether the prediction leaves enough room in the budget; if not, the fastest settings were chosen.
     pub fits: bool,
-    /// What the call took, seconds, without an optimisation that was asked for in addition.
+    /// Time that the call took without a refinement, seconds.
     pub took_s: f64,
-    /// Whether that is within the budget.
+    /// Whether that time is within the budget.
     pub kept: bool,
-    /// How fast this machine was found to be.
+    /// The measured speed of this machine.
     pub machine: Machine,
-    /// What was chosen, the same as in the report's `settings`.
+    /// The chosen settings, as in the report's `settings`.
     pub chosen: Chosen,
 }
 
 impl BudgetPlan {
-    /// The plan after a run with these stages. A refinement is beside it.
+    /// The plan with the time of a run, from its stages; a refinement is not part of the budget.
     pub(super) fn after(self, stages: &[Stage]) -> Self {
         let took_s: f64 = 1e-3 * stages.iter().filter(|s| s.name != "refine").map(|s| s.ms).sum::<f64>();
         Self { took_s, kept: took_s <= self.budget_s, ..self }
     }
 
-    /// What a caller should know whose budget was not kept.
+    /// A sentence for the caller where the budget was exceeded.
     pub fn warning(&self) -> Option<String> {
         let Self { budget_s, took_s, .. } = self;
         let why = if self.fits { "" } else { ", though all was left out that can be" };
@@ -49,7 +49,7 @@ impl BudgetPlan {
     }
 }
 
-/// The options that a budget decides on.
+/// The options that a budget can change.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Chosen {
     /// Depth source.
@@ -82,7 +82,7 @@ impl Chosen {
     }
 }
 
-/// The options to work with, which have no budget any more, and why, if there was one.
+/// The options to work with, which have no budget, and how a budget was resolved.
 pub(super) fn resolved(
     scene: &Scene,
     options: &Options,
@@ -110,7 +110,7 @@ pub(super) fn resolved(
     (chosen, Some(plan))
 }
 
-/// What the views of a scene amount to.
+/// The size of a scene, for the cost model.
 pub(super) fn load(scene: &Scene) -> Load {
     let shows = |v: &&vg_scene::View| v.mask.as_ref().is_none_or(|m| m.vehicle_pixels() > 0);
     let views: Vec<_> = scene.views.iter().filter(shows).collect();
@@ -129,7 +129,7 @@ pub(super) fn load(scene: &Scene) -> Load {
     }
 }
 
-/// One step down; what the caller has given up already stays given up.
+/// One step to less work; an option that the caller set lower stays there.
 type Step = fn(&mut Options);
 
 fn coarser(options: &mut Options, share: f64) {
@@ -140,7 +140,7 @@ fn fewer(options: &mut Options, most: usize) {
     options.max_views = Some(options.max_views.map_or(most, |views| views.min(most)));
 }
 
-/// In order of what they cost in quality beside what they save, see docs/PLAN.md.
+/// The steps in order of quality lost per time saved, see docs/PLAN.md.
 const STEPS: &[Step] = &[
     |_| {},
     |o| o.check = false,
@@ -172,7 +172,7 @@ fn candidates(options: &Options, load: &Load, machine: Machine) -> Vec<(Options,
     let mut out: Vec<(Options, f64)> = Vec::new();
     for step in STEPS {
         step(&mut now);
-        // Measured depth is as fast as it gets, and the hull is worse.
+        // Measured depth is faster and better than the hull.
         if load.has_depth && now.prior == PriorChoice::Hull && options.prior == PriorChoice::Auto {
             now.prior = PriorChoice::Auto;
         }
@@ -187,22 +187,22 @@ fn candidates(options: &Options, load: &Load, machine: Machine) -> Vec<(Options,
     out
 }
 
-/// Resolution and views are noted where they are left out, with or without a budget.
+/// Notes what the budget left out. Resolution and views are noted by the stages that reduce them.
 fn note_differences(
-    asked: &Options,
+    requested: &Options,
     chosen: &Options,
     load: &Load,
     budget_s: f64,
     left_out: &mut Vec<LeftOut>,
 ) {
     let why = format!("no time for it in a budget of {budget_s} s");
-    let shape = matches!(asked.prior, PriorChoice::Auto | PriorChoice::Shape) && !load.has_depth;
+    let shape = matches!(requested.prior, PriorChoice::Auto | PriorChoice::Shape) && !load.has_depth;
     for (what, gone) in [
-        ("check", asked.check && !chosen.check),
-        ("photo-consistency", shape && asked.photo && !chosen.photo),
-        ("shape prior", asked.prior != chosen.prior),
-        ("calibration", asked.calibrate != chosen.calibrate),
-        ("light of the unseen side", asked.relight != chosen.relight),
+        ("check", requested.check && !chosen.check),
+        ("photo-consistency", shape && requested.photo && !chosen.photo),
+        ("shape prior", requested.prior != chosen.prior),
+        ("calibration", requested.calibrate != chosen.calibrate),
+        ("light of the unseen side", requested.relight != chosen.relight),
     ] {
         note(left_out, what, &why, usize::from(gone));
     }
@@ -231,15 +231,15 @@ mod tests {
     }
 
     #[test]
-    fn what_the_caller_chose_is_never_taken_back() {
-        let asked = Options {
+    fn settings_of_the_caller_are_never_raised() {
+        let requested = Options {
             check: false,
             resolution: 0.3,
             max_views: Some(2),
             prior: PriorChoice::Shape,
             ..Options::default()
         };
-        for (options, _) in candidates(&asked, &car(9, false), MACHINE) {
+        for (options, _) in candidates(&requested, &car(9, false), MACHINE) {
             assert!(!options.check && options.resolution <= 0.3 && options.prior == PriorChoice::Shape);
             assert!(options.max_views.is_some_and(|most| most <= 2));
         }
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_that_took_longer_than_its_budget_without_the_refinement_is_said() {
+    fn a_run_that_exceeded_its_budget_without_the_refinement_gives_a_warning() {
         let stage = |name, ms| Stage { name, ms };
         let stages = [stage("prior", 700.0), stage("refine", 9000.0), stage("check", 400.0)];
         let plan = |budget_s, fits| BudgetPlan {

@@ -1,34 +1,35 @@
-//! A cap on the size of the model, kept before the work is done, by what the masks say of its size. Where that is more
-//! than [`Options::max_gaussians`], the views are resampled.
+//! A cap on the size of the model, enforced before the work is done: the masks give the number of Gaussians to expect.
+//! Where it exceeds [`Options::max_gaussians`], the views are resampled.
 //!
-//! Every vehicle pixel can become a Gaussian, and each of those a mirror image. But views overlap: a place becomes one
-//! Gaussian, of the view that shows it best. The surface of a convex body is four times the mean of its shadows (Cauchy),
-//! so that the whole vehicle takes about four times the pixels of its largest mask, from however many sides it was seen.
+//! Every vehicle pixel can become a Gaussian, and each Gaussian can get a mirror image. But views overlap: a place
+//! becomes one Gaussian, of the view that shows it best. The surface of a convex body is four times the mean area of
+//! its shadows (Cauchy), so the whole vehicle takes about four times the pixels of its largest mask, whatever the
+//! number of views.
 
 use super::options::Options;
 use super::plan;
 use super::report::LeftOut;
-use super::run::undistorted;
+use super::undistort::undistorted;
 use crate::symmetry::SymmetryMode;
 use vg_geometry::progress::Context;
 use vg_geometry::{Error, Result};
 use vg_scene::{Mask, Scene, View};
 
-/// The default. A PLY file of so many, 164 bytes each at SH degree 2, has 2 GB. Photographs of 1920 x 1080 pixels are
-/// below, however many, even where the vehicle fills 96 % of one.
+/// The default: a PLY file of 2 GB, at 164 bytes per Gaussian of SH degree 2. Any number of photographs of 1920 x 1080
+/// pixels stays below, up to a vehicle that fills 96 % of one.
 pub const DEFAULT_MAX_GAUSSIANS: usize = 12_000_000;
 
-/// The resolution is lowered in such steps, so that it can be told and asked for.
+/// Steps per unit in which the resolution is lowered, so that it can be written and requested exactly.
 const STEPS: f64 = 1000.0;
 
-/// Surface in pixels of the largest mask: four for a convex body, and half as much again for what is not convex. Of
-/// vehicles from 40 sides, 3.5 and 3.8 were measured.
+/// Surface in units of the largest mask: four for a convex body, and half as much again for concave parts. Measured on
+/// vehicles seen from 40 sides: 3.5 and 3.8.
 const SURFACE: usize = 6;
 
-/// Least that another try lowers the resolution by; lenses and rounded sides make pixels that were not foreseen.
+/// Largest factor from one resolution to the next one tried. Undistortion and rounded image sizes add pixels.
 const LOWER: f64 = 0.98;
 
-/// The views to work with, at the resolution asked for or at a lower one that keeps the cap.
+/// The views to work with, at the resolution of the options or at a lower one that keeps the cap.
 pub(super) fn fitted(
     scene: &Scene,
     used: &[usize],
@@ -36,12 +37,12 @@ pub(super) fn fitted(
     left_out: &mut Vec<LeftOut>,
     context: &Context,
 ) -> Result<Vec<View>> {
-    let asked = options.resolution;
+    let requested = options.resolution;
     let at = |resolution: f64, notes: &mut Vec<LeftOut>| undistorted(scene, used, resolution, notes, context);
-    let Some(cap) = options.max_gaussians else { return at(asked, left_out) };
+    let Some(cap) = options.max_gaussians else { return at(requested, left_out) };
     let given = used.iter().map(|&i| &scene.views[i]);
-    let most = (most_gaussians(given, options) as f64 * asked * asked) as usize;
-    let mut resolution = if most > cap { lowered(asked, cap, most) } else { asked };
+    let most = (most_gaussians(given, options) as f64 * requested * requested) as usize;
+    let mut resolution = if most > cap { lowered(requested, cap, most) } else { requested };
     loop {
         let too_few = || {
             let found = format!("{cap}, where the masks allow for {most}");
@@ -52,7 +53,7 @@ pub(super) fn fitted(
         }
         let mut notes = Vec::new();
         let views = at(resolution, &mut notes).map_err(|e| match e {
-            Error::Argument { .. } if resolution < asked => too_few(),
+            Error::Argument { .. } if resolution < requested => too_few(),
             other => other,
         })?;
         let now = most_gaussians(&views, options);
@@ -61,7 +62,7 @@ pub(super) fn fitted(
             continue;
         }
         left_out.append(&mut notes);
-        if resolution < asked {
+        if resolution < requested {
             let why = format!(
                 "the masks allow for {most}, more than max_gaussians, {cap}: the views are resampled to {resolution} of \
                  their width and height"
@@ -72,10 +73,10 @@ pub(super) fn fitted(
     }
 }
 
-/// What the cap leaves out, as the report calls it.
+/// The name of what the cap leaves out, in the report.
 pub const GAUSSIANS: &str = "Gaussians";
 
-/// The most Gaussians that the views can be expected to become.
+/// Upper estimate of the number of Gaussians from these views.
 fn most_gaussians<'a>(views: impl IntoIterator<Item = &'a View>, options: &Options) -> usize {
     let all = |view: &View| view.camera.width as usize * view.camera.height as usize;
     let vehicle = |view: &View| view.mask.as_ref().map_or_else(|| all(view), Mask::vehicle_pixels);
@@ -91,7 +92,7 @@ fn most_gaussians<'a>(views: impl IntoIterator<Item = &'a View>, options: &Optio
     }
 }
 
-/// The resolution at which `cap` of what are now `most` are left.
+/// The resolution at which `most` Gaussians become `cap`.
 fn lowered(resolution: f64, cap: usize, most: usize) -> f64 {
     in_steps(resolution * (cap as f64 / most as f64).sqrt())
 }

@@ -1,15 +1,64 @@
-//! The error that a reconstruction can know: that of its pictures of what it was made from.
+//! The stage `check`: the model in the caller's frame, drawn into its input views, and judged.
 
+use super::frame::{Given, InFrame};
 use super::report::{CheckedView, InputError};
+use super::run::{PointCloud, Run};
+use super::size::VehicleSize;
+use super::verdict::{self, Evidence, Examined, Judged, Reason};
 use crate::metrics;
+use crate::symmetry::SymmetryMode;
 use vg_geometry::Result;
 use vg_geometry::progress::Context;
 use vg_scene::View;
 use vg_splat::Gaussians;
 use vg_splat::render::{CpuRenderer, RenderOptions, Renderer};
 
-/// The model drawn into the views it came from: by the cameras that were used, and by those that the caller gave.
-/// `used` and `given` differ in their cameras' poses alone.
+/// The finished model and how far it can be trusted.
+pub(super) struct Checked {
+    pub(super) gaussians: InFrame<Given, Gaussians>,
+    pub(super) points: Option<InFrame<Given, PointCloud>>,
+    /// Length, width and height of the vehicle.
+    pub(super) size: Option<VehicleSize>,
+    /// How far masks, depth and photographs agree with one another.
+    pub(super) evidence: Evidence,
+    /// The errors in each used view; empty where the check was switched off.
+    pub(super) input_views: Vec<CheckedView>,
+    /// Why the verdict is not good.
+    pub(super) reasons: Vec<Reason>,
+}
+
+/// Moves the model to the caller's frame, measures it there against the photographs, and judges it.
+pub(super) fn check(run: &mut Run) -> Result<()> {
+    let (gaussians, points) = (run.gaussians.take(), run.points.take());
+    let (plan, views, surface) = (&*run.plan, &*run.views, &*run.surface);
+    let size = VehicleSize::measured(&gaussians, &surface.geometry);
+    let originals: Vec<&View> = plan.used.iter().map(|&i| &plan.scene.views[i]).collect();
+    let examined = Examined { given: &originals, used: &views.working, geometry: Some(&surface.geometry) };
+    let evidence = match plan.options.check {
+        true => verdict::compare(&examined, run.context),
+        false => verdict::glance(&examined),
+    };
+
+    let gaussians = views.given_from_working.gaussians(gaussians, run.context)?;
+    let points = points.map(|points| views.given_from_working.points(points));
+    let evidence = evidence.with_model(&gaussians, views.in_given_frame());
+    let input_views = match plan.options.check {
+        true => checked(&gaussians, views.in_given_frame(), &run.pinholes, run.context)?,
+        false => Vec::new(),
+    };
+    let reasons = verdict::judge(&Judged {
+        evidence: &evidence,
+        checked: &input_views,
+        calibration: views.report.as_ref(),
+        has_depth: plan.source.is_per_pixel(),
+        is_completed: plan.options.symmetry != SymmetryMode::Never,
+    });
+    run.checked.set(Checked { gaussians, points, size, evidence, input_views, reasons });
+    Ok(())
+}
+
+/// The error of the model in the views it was made of, drawn by the cameras that were used and by those that the caller
+/// gave. `used` and `given` differ in the poses of their cameras only.
 pub(super) fn checked(
     gaussians: &Gaussians,
     used: &[View],

@@ -1,48 +1,47 @@
-//! Which measured depths lie on no surface of the vehicle: depth that was given or that a network predicted.
+//! The guard: finds given or predicted depths that lie on no surface of the vehicle.
 //!
-//! Sensors, networks and resampling mix two surfaces in one pixel at a depth edge, or a surface and nothing, and a few
-//! such pixels make a vehicle many times its size. The priors that estimate a surface have none of them.
+//! Sensors, networks and resampling mix two surfaces in one pixel at a depth edge, or a surface and missing depth, and
+//! a few such pixels make a vehicle many times its size. Priors that estimate a closed surface do not produce them.
 
 use crate::prior::volume::Silhouette;
 use rayon::prelude::*;
 use vg_scene::mask::Label;
 use vg_scene::{DepthMap, View};
 
-/// A surface that is seen under 87 degrees changes its depth by this many pixel footprints from pixel to pixel; more is
-/// an edge.
+/// Change of depth from pixel to pixel of a surface seen at 87 degrees, pixel footprints; a larger change is an edge.
 const STEEP_FOOTPRINTS: f32 = 20.0;
 
-/// Sensors are noisy by less than this share of the depth from pixel to pixel.
+/// Upper bound of a sensor's noise from pixel to pixel, as a share of the depth.
 const NOISE: f32 = 0.02;
 
-/// Parts of one vehicle hang together to this, metres.
+/// Largest step in depth within a connected patch, metres.
 const LOOSE_M: f32 = 0.5;
 
-/// A patch of depth that hangs together with nothing else, nearer or farther than all that does, is a stray below this
-/// share of the vehicle's pixels.
+/// A separate patch of depth that is nearer or farther than all large patches is a stray below this share of the
+/// vehicle's pixels.
 const STRAY_SHARE: f64 = 0.005;
 
-/// A place that lies farther outside another view's silhouette is not the vehicle's, metres: poses are wrong by less,
-/// and by no more does a mask's error move its edge.
+/// A place farther outside another view's silhouette is not on the vehicle, metres: errors of poses and masks move the
+/// edges by less.
 const DENIED_M: f32 = 0.25;
 
-/// Part of the depth that silhouettes may deny.
+/// Largest share of the depth that silhouettes may reject.
 const MOST_DENIED: f64 = 0.5;
 
-/// What speaks against a depth.
+/// The reason to reject a depth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Doubt {
-    /// Nothing, or there is no depth.
+    /// No doubt, or no depth.
     None,
-    /// Between two surfaces, or a surface and nothing: an edge runs on both of its sides.
+    /// Between two surfaces, or a surface and missing depth: there is an edge on both sides.
     Floating,
-    /// One of a small patch before or behind the vehicle.
+    /// In a small patch in front of or behind the vehicle.
     Stray,
     /// Outside the silhouette in most of the other views that could show it.
     Denied,
 }
 
-/// Takes doubtful depths out of `depths`, which belong to `views`, and says which they were. `[view][pixel]`
+/// Removes doubtful depths from `depths`, one map per view, and returns the reasons. `[view][pixel]`
 pub(super) fn doubtful(views: &[View], depths: &mut [DepthMap]) -> Vec<Vec<Doubt>> {
     let mut doubts: Vec<Vec<Doubt>> =
         views.par_iter().zip(&*depths).map(|(view, depth)| loose(view, depth)).collect();
@@ -55,7 +54,7 @@ pub(super) fn doubtful(views: &[View], depths: &mut [DepthMap]) -> Vec<Vec<Doubt
     doubts
 }
 
-/// What a view's own depth tells: floating pixels, then strays among the others.
+/// Doubts from a view's own depth: floating pixels, then strays among the others.
 fn loose(view: &View, depth: &DepthMap) -> Vec<Doubt> {
     let focal = view.camera.intrinsics.smaller_focal() as f32;
     let is_vehicle = |i: usize| view.mask.as_ref().is_none_or(|m| m.labels()[i] == Label::Vehicle);
@@ -78,7 +77,7 @@ fn loose(view: &View, depth: &DepthMap) -> Vec<Doubt> {
     let range = |patch: &[usize]| {
         patch.iter().fold((f32::INFINITY, 0.0f32), |(low, high), &i| (low.min(z[i]), high.max(z[i])))
     };
-    // Between these, as through a window, a small patch may well be a part of the vehicle.
+    // A small patch between these, as behind a window, can be a part of the vehicle.
     let (low, high) = range(&large.concat());
     for patch in small.into_iter().filter(|_| !large.is_empty()) {
         let (near, far) = range(&patch);
@@ -89,8 +88,8 @@ fn loose(view: &View, depth: &DepthMap) -> Vec<Doubt> {
     doubts
 }
 
-/// Whether, along the rows or along the columns, no neighbour with depth continues the surface, though there is one.
-/// `steep` is the change from pixel to pixel that makes an edge, as a share of the depth.
+/// Whether, along the row or the column, there are neighbours with depth and none continues the surface. `steep` is the
+/// change from pixel to pixel that makes an edge, as a share of the depth.
 fn is_floating(depth: &DepthMap, u: usize, v: usize, steep: f32) -> bool {
     let (width, height) = (depth.width() as usize, depth.height() as usize);
     let here = depth.depth()[v * width + u];
@@ -105,7 +104,7 @@ fn is_floating(depth: &DepthMap, u: usize, v: usize, steep: f32) -> bool {
     torn(before(u, &|u| at(u, v)), at(u + 1, v)) || torn(before(v, &|v| at(u, v)), at(u, v + 1))
 }
 
-/// Pixels that are set and hang together in depth, a list for each patch.
+/// Connected patches of set pixels without steps in depth, as lists of pixels.
 fn patches(set: &[bool], z: &[f32], width: usize) -> Vec<Vec<usize>> {
     let mut seen: Vec<bool> = set.iter().map(|set| !set).collect();
     let mut patches = Vec::new();
@@ -133,10 +132,10 @@ fn patches(set: &[bool], z: &[f32], width: usize) -> Vec<Vec<usize>> {
     patches
 }
 
-/// What the other views' silhouettes tell. One alone may be cut by something before the vehicle.
+/// Doubts from the silhouettes of the other views, by majority: an object in front of the vehicle may cut a single one.
 ///
-/// Where they deny most of the depth, it is of another unit or another frame, and no pixel is to blame: all of it stays,
-/// for the verdict to tell.
+/// Where they reject most of the depth, it is in another unit or frame and no pixel is to blame. All of it is kept
+/// then, and the verdict reports the contradiction.
 fn deny(views: &[View], depths: &[DepthMap], doubts: &mut [Vec<Doubt>]) {
     let before = doubts.to_vec();
     deny_pixels(views, depths, doubts);
@@ -188,7 +187,7 @@ mod tests {
     use vg_geometry::{Camera, Intrinsics, Pose};
     use vg_scene::RgbImage;
 
-    /// A wall two metres away, `f` = 100 px, and what is drawn over it.
+    /// The doubts for a wall two metres away, f = 100 px, with `draw` over it.
     fn doubts(draw: impl Fn(usize, usize) -> Option<f32>) -> Vec<Doubt> {
         const WIDTH: usize = 60;
         let intrinsics = Intrinsics { fx: 100.0, fy: 100.0, cx: 30.0, cy: 20.0 };
@@ -212,7 +211,7 @@ mod tests {
         let found = doubts(|u, _| Some([2.0, 6.0, 10.0, 14.0, 18.0][u.clamp(29, 33) - 29]));
         assert_eq!(columns(&found, Doubt::Floating), [30, 31, 32]);
         assert!(columns(&found, Doubt::Stray).is_empty());
-        // Towards nothing, as a resize makes that takes 0 for a depth.
+        // Towards missing depth, as a resize makes that interpolates the 0.
         let found = doubts(|u, _| Some([2.0, 1.5, 0.5, 0.0][u.clamp(29, 32) - 29]));
         assert_eq!(columns(&found, Doubt::Floating), [30, 31]);
     }
@@ -227,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_few_pixels_that_hang_loose_are_strays_and_a_part_of_some_size_is_none() {
+    fn a_few_separate_pixels_are_strays_and_a_larger_part_is_not() {
         let block = |side: usize| {
             doubts(move |u, v| ((20..20 + side).contains(&u) && (10..10 + side).contains(&v)).then_some(60.0))
         };
@@ -239,7 +238,7 @@ mod tests {
             assert_eq!(taken, drawn, "{side}");
         }
         assert!(block(12).iter().all(|d| *d == Doubt::None));
-        // Of the vehicle's own range.
+        // Within the depth range of the vehicle.
         let seen_through = doubts(|u, v| match (u, v) {
             (20..22, 10..12) => Some(3.0),
             (40.., _) => Some(3.2),

@@ -1,5 +1,5 @@
-//! How fast this machine is: a few milliseconds of the kind of work that a reconstruction is made of, once for every
-//! number of threads in a process.
+//! The speed of this machine, measured by a few milliseconds of work like that of a reconstruction, once per process
+//! and number of threads.
 
 use crate::prior::volume::Silhouette;
 use glam::Vec3;
@@ -14,28 +14,28 @@ use vg_geometry::{Camera, Intrinsics, Pose};
 use vg_scene::mask::Label;
 use vg_scene::{Mask, RgbImage, View};
 
-/// Pieces of work a second on one thread of the machine that the cost model was measured on.
+/// Pieces of work per second on one thread of the reference machine, which the cost model was measured on.
 const REFERENCE_RATE: f64 = 64_000.0;
 
-/// Pieces per thread and measurement. The fastest measurement counts: whatever else runs can only slow the others
-/// down, and how much will differ by the time it matters.
+/// Pieces per thread and measurement. The fastest measurement counts: other load on the machine slows the rest down,
+/// and that load will have changed when the work is done.
 const PIECES: usize = 8;
 
-/// How long one thread is measured, and how long all of them: fresh ones may share a core until the system notices.
+/// Duration of the measurement of one thread, and of all: new threads may share a core until the system moves them.
 const ALONE: Duration = Duration::from_millis(3);
 const TOGETHER: Duration = Duration::from_millis(25);
 
-/// Speed beside one thread of the reference machine.
+/// Speed relative to one thread of the reference machine.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Machine {
-    /// Of one thread.
+    /// Speed of one thread.
     pub serial: f64,
-    /// Of all threads of the call together.
+    /// Speed of all threads of the call together.
     pub parallel: f64,
 }
 
 impl Machine {
-    /// Measured by the first caller with so many threads, remembered for the others.
+    /// Measured at the first call with this number of threads, and stored for later calls.
     pub(super) fn measured(context: &Context) -> Self {
         static KNOWN: Mutex<BTreeMap<usize, Machine>> = Mutex::new(BTreeMap::new());
         let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -57,12 +57,12 @@ impl Machine {
         let serial = fastest(PIECES, ALONE, &|| (0..PIECES).for_each(|k| probe.piece(k)));
         let all = PIECES * threads;
         let parallel = fastest(all, TOGETHER, &|| (0..all).into_par_iter().for_each(|k| probe.piece(k)));
-        // Threads that share a core are no slower together than one alone.
+        // Threads that share a core are together at least as fast as one alone.
         Self { serial, parallel: parallel.max(serial) }
     }
 }
 
-/// What is done.
+/// The work that is timed.
 struct Probe {
     silhouette: Silhouette,
     picture: Vec<f32>,
@@ -88,7 +88,7 @@ impl Probe {
         Some(Self { silhouette: Silhouette::new(&view), picture })
     }
 
-    /// Look-ups in a silhouette's cone, and some rows of a 3 x 3 convolution.
+    /// One piece: look-ups in a silhouette's cone, and some rows of a 3 x 3 convolution.
     fn piece(&self, k: usize) {
         let mut sum = 0.0f32;
         for i in 0..1024usize {
@@ -98,7 +98,7 @@ impl Probe {
         black_box(sum + self.convolved());
     }
 
-    /// Out of line and by rows, so that no caller's optimisation makes it another work.
+    /// Not inlined and by rows, so that the optimiser compiles it alike for all callers.
     #[inline(never)]
     fn convolved(&self) -> f32 {
         let mut sum = [0.0f32; WIDTH - 2];

@@ -1,29 +1,31 @@
-//! Masks for views that have none, from depth that was measured on the vehicle and nowhere else.
+//! Masks for views that have none, from depth that was measured on the vehicle only.
 
 use super::options::PriorChoice;
 use super::plan::note;
+use super::prior::Source;
 use super::report::LeftOut;
 use vg_geometry::{Error, Result};
 use vg_scene::mask::{Label, Mask};
 use vg_scene::{DepthMap, Scene, View};
 
-/// The scene with a mask for each of the `used` views. Silhouette priors refuse a view without, in words of their own;
-/// where depth tells the surface, all of the photograph would become vehicle.
+/// The scene with a mask for each of the `used` views that needs one. Priors that work from silhouettes refuse a view
+/// without a mask themselves; with depth per pixel, all of the photograph would become vehicle.
 pub(super) fn masked(
     scene: &Scene,
     used: &[usize],
-    prior: PriorChoice,
+    source: &Source,
     left_out: &mut Vec<LeftOut>,
 ) -> Result<Scene> {
     let mut scene = scene.clone();
     let mut filled = 0;
-    for &i in used.iter().filter(|_| matches!(prior, PriorChoice::Given | PriorChoice::Onnx)) {
+    let is_given = matches!(source, Source::BuiltIn(PriorChoice::Given));
+    for &i in used.iter().filter(|_| source.is_per_pixel()) {
         let view = &scene.views[i];
         if view.mask.is_some() {
             continue;
         }
         let argument = format!("{}.mask", view.argument(i));
-        let outline = view.depth.as_ref().filter(|_| prior == PriorChoice::Given).map(outline);
+        let outline = view.depth.as_ref().filter(|_| is_given).map(outline);
         match outline {
             Some(Some(mask)) => scene.views[i] = View { mask: Some(mask), ..scene.views[i].clone() },
             Some(None) => {
@@ -47,8 +49,8 @@ pub(super) fn masked(
     Ok(scene)
 }
 
-/// Vehicle where depth was measured, background around it, unknown in its holes; `None` where the picture's border
-/// was measured too, or nothing was.
+/// Vehicle where depth was measured, background around it, unknown in its holes; `None` where depth reaches the image
+/// border or was measured nowhere.
 fn outline(depth: &DepthMap) -> Option<Mask> {
     let (width, height) = (depth.width() as usize, depth.height() as usize);
     let z = depth.depth();
@@ -61,7 +63,7 @@ fn outline(depth: &DepthMap) -> Option<Mask> {
     }
     let mut labels: Vec<Label> =
         z.iter().map(|z| if *z > 0.0 { Label::Vehicle } else { Label::Unknown }).collect();
-    // From the border inwards: all of it hangs together.
+    // The border is connected: flood the background from one of its pixels.
     let mut open = vec![0];
     labels[0] = Label::Background;
     while let Some(i) = open.pop() {
@@ -87,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_measured_is_vehicle_its_holes_are_unknown_and_the_rest_is_background() {
+    fn measured_pixels_are_vehicle_their_holes_are_unknown_and_the_rest_is_background() {
         let drawing = [".......", "..###..", "..#.#..", "..###..", "......."].concat();
         let depth = drawing.bytes().map(|c| if c == b'#' { 3.0 } else { 0.0 }).collect();
         let mask = outline(&DepthMap::new(7, 5, depth).unwrap()).unwrap();
@@ -104,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn depth_at_the_border_and_no_depth_are_no_outline() {
+    fn depth_that_reaches_the_border_or_is_missing_gives_no_outline() {
         let map = |at: Option<usize>| {
             let depth = (0..35).map(|i| if at == Some(i) { 3.0 } else { 0.0 }).collect();
             outline(&DepthMap::new(7, 5, depth).unwrap())

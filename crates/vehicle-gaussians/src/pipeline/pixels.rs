@@ -1,24 +1,53 @@
-//! Which pixels become Gaussians: vehicle, with depth, on a surface, and shown best by their own view.
+//! The stage `pixels`: the choice of pixels that become Gaussians. They show the vehicle, have depth, lie on a surface,
+//! and no other view shows the place better.
 
+use super::frame::InFrame;
 use super::guard::Doubt;
 use super::options::Keep;
 use super::plan::note;
 use super::report::LeftOut;
+use super::run::{PointCloud, Run};
 use crate::prior::Geometry;
+use crate::symmetry::BETTER;
 use glam::Vec3;
 use rayon::prelude::*;
+use vg_geometry::Result;
 use vg_scene::mask::{Label, Mask};
 use vg_scene::visibility::{Observer, Sight};
 use vg_scene::{DepthMap, View};
 
-/// Another view, or a mirror image, must show a place this much better before what was observed is given up for it.
-/// With nothing between, gaps open where one view's grid of Gaussians ends and another's begins.
-pub(super) const BETTER: f32 = 1.03;
-
 /// Two depths belong to one surface when they differ by less than this many pixel footprints.
 const SURFACE_FOOTPRINTS: f32 = 6.0;
 
-/// What becomes of a pixel.
+/// Chooses the pixels, and makes the coloured points where the caller wants them.
+pub(super) fn pixels(run: &mut Run) -> Result<()> {
+    let (views, surface, options) = (&*run.views, &*run.surface, &run.plan.options);
+    let (geometry, left_out) = (&surface.geometry, &mut run.left_out);
+    let kept =
+        run.context.parallel(|| kept(views.modelled(), geometry, &surface.doubts, &options.keep, left_out));
+    let points = options.points.then(|| InFrame::new(point_cloud(&views.working, geometry)));
+    run.kept.set(kept);
+    run.points.set(points);
+    Ok(())
+}
+
+/// Every vehicle pixel with depth, lifted (paper eqs. `metric_point_ray`, `vehicle_point`).
+fn point_cloud(views: &[View], geometry: &Geometry) -> PointCloud {
+    let mut cloud = PointCloud::default();
+    for (view, depth) in views.iter().zip(&geometry.depths) {
+        for (v, u) in (0..view.camera.height).flat_map(|v| (0..view.camera.width).map(move |u| (v, u))) {
+            if view.mask.as_ref().is_none_or(|m| m.is_vehicle(u, v))
+                && let Some(z) = depth.get(u, v)
+            {
+                cloud.positions.push(view.lift(u, v, z).to_array());
+                cloud.colors.push(view.image.get(u, v));
+            }
+        }
+    }
+    cloud
+}
+
+/// The decision about a pixel.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Verdict {
     Kept,
@@ -31,9 +60,9 @@ enum Verdict {
     Redundant,
 }
 
-/// One flag per pixel of every view; the others are counted with their reasons. `doubts` say why the guard took a
-/// depth out of `geometry`; they are empty where there was none.
-pub(super) fn kept(
+/// One flag per pixel of every view; rejected pixels are counted by reason. `doubts` hold why the guard removed a depth
+/// from `geometry`; they are empty where the guard did not run.
+fn kept(
     views: &[View],
     geometry: &Geometry,
     doubts: &[Vec<Doubt>],
@@ -111,9 +140,9 @@ impl Judge<'_> {
     }
 }
 
-/// A vehicle pixel between background and a pixel that is vehicle all round: its colour is partly the
-/// background's, and its surfel would spill over the silhouette by its own footprint; the neighbour's footprint
-/// covers it. A structure so thin that it has no such inside keeps its pixels.
+/// Whether a vehicle pixel lies between the background and a pixel with vehicle on all sides. Its colour is partly the
+/// background's, and its surfel would extend beyond the silhouette by its own footprint; the footprint of the neighbour
+/// covers it. A structure too thin to have such an inside keeps its pixels.
 fn is_at_edge(mask: &Mask, u: i32, v: i32) -> bool {
     const CROSS: [(i32, i32); 4] = [(-1, 0), (1, 0), (0, -1), (0, 1)];
     let label = |u: i32, v: i32| {
@@ -131,9 +160,9 @@ fn is_at_edge(mask: &Mask, u: i32, v: i32) -> bool {
     beside_background(u, v) && has_inner_neighbour()
 }
 
-/// A pixel that fewer than three of its neighbours share a surface with hangs between two surfaces. A slanted
-/// surface changes depth from pixel to pixel by footprint / cos(obliquity); the neighbour's own normal tells
-/// how much, for a floating pixel has none.
+/// Whether a pixel lies between two surfaces: fewer than three of its neighbours share a surface with it. The depth of
+/// a slanted surface changes from pixel to pixel by footprint / cos(obliquity), which is computed from the normal of
+/// the neighbour, since a floating pixel has no valid normal.
 fn is_floating(depth: &DepthMap, normals: &[Vec3], u: u32, v: u32, tolerance: f32) -> bool {
     const SUPPORT: usize = 3;
     const LEAST_COS: f32 = 0.1;

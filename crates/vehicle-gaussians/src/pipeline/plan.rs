@@ -1,24 +1,69 @@
-//! What this scene needs, decided before the work is done; each omission has a reason and a count.
+//! The stage `plan`: the views, the depth source and the settings for this scene, chosen before the work is done. Each
+//! omission has a reason and a count.
 
+use super::budget::{self, BudgetPlan};
 use super::options::{Keep, Options, PriorChoice};
+use super::prior::Source;
 use super::report::LeftOut;
+use super::run::Run;
+use super::spread::spread;
+use super::{cost, outline};
 use crate::prior::volume::known_box::TELLING_M;
 use crate::prior::{BoxSource, Geometry, PointFit, WorkingBox};
 use glam::DVec3;
 use vg_geometry::Camera;
 use vg_geometry::{Error, Result};
-use vg_scene::{Scene, View};
+use vg_scene::{Place, Scene, VehicleBox, View};
 
-/// Cameras nearer to each other than this, looking the same way, show the same.
+/// Cameras nearer to each other than this, with the same rotation, show the same.
 const SAME_CENTER_M: f64 = 1e-3;
 /// About 0.06 degrees.
 const SAME_ROTATION: f64 = 1e-3;
 
-/// Views within this see the same colour: no view dependence to hold, degrees.
+/// Views within this angle show the same colour: there is no view dependence to represent, degrees.
 const NARROW_DEGREES: f64 = 10.0;
 
-/// Within this a linear change of colour with direction is all that can be told, degrees.
+/// Views within this angle determine a linear change of colour with direction and nothing finer, degrees.
 const WIDE_DEGREES: f64 = 40.0;
+
+/// The settings and the input of the later stages.
+pub(super) struct Plan<'a> {
+    /// The caller's options; where there was a budget, those that it led to.
+    pub(super) options: Options,
+    /// How a budget was resolved.
+    pub(super) budget: Option<BudgetPlan>,
+    /// The caller's scene, with a mask for each used view that needs one.
+    pub(super) scene: Scene,
+    /// Indices of the used views.
+    pub(super) used: Vec<usize>,
+    /// Where depth comes from.
+    pub(super) source: Source<'a>,
+    /// The vehicle's box, where the caller knows it.
+    pub(super) known_box: Option<VehicleBox>,
+}
+
+impl Plan<'_> {
+    /// The place of a known box that stands off the plane y = 0: its middle plane is then the plane of symmetry.
+    pub(super) fn place_off_plane(&self) -> Option<Place> {
+        self.known_box.and_then(|known| known.place).filter(|place| !place.is_on_the_plane())
+    }
+}
+
+/// Chooses the options that fit the budget, the views, and the depth source.
+pub(super) fn plan(run: &mut Run) -> Result<()> {
+    let Run { scene, requested, context, .. } = *run;
+    let (options, budget) =
+        budget::resolved(scene, requested, context, || run.clock.elapsed(), &mut run.left_out);
+    context.follow(cost::course(&budget::load(scene), &options, context.threads()));
+    let used = views(scene, &options.keep, &mut run.left_out)?;
+    let used = chosen_views(scene, used, &options, &mut run.left_out);
+    let all_have_depth = used.iter().all(|&i| scene.views[i].depth.is_some());
+    let source = Source::new(&run.parts, options.prior, all_have_depth);
+    let scene = outline::masked(scene, &used, &source, &mut run.left_out)?;
+    let known_box = options.vehicle_box(&scene);
+    run.plan.set(Plan { options, budget, scene, used, source, known_box });
+    Ok(())
+}
 
 /// Indices of the views worth using.
 pub(super) fn views(scene: &Scene, keep: &Keep, left_out: &mut Vec<LeftOut>) -> Result<Vec<usize>> {
@@ -45,6 +90,20 @@ pub(super) fn views(scene: &Scene, keep: &Keep, left_out: &mut Vec<LeftOut>) -> 
     Ok(used)
 }
 
+/// As many of the used views as the caller allows.
+pub(super) fn chosen_views(
+    scene: &Scene,
+    used: Vec<usize>,
+    options: &Options,
+    left_out: &mut Vec<LeftOut>,
+) -> Vec<usize> {
+    let Some(most) = options.max_views.filter(|most| *most < used.len()) else { return used };
+    let views: Vec<View> = used.iter().map(|&i| scene.views[i].clone()).collect();
+    let why = format!("more than max_views, {most}: those that were kept spread best around the vehicle");
+    note(left_out, "views", &why, used.len() - most);
+    spread(&views, most).into_iter().map(|i| used[i]).collect()
+}
+
 fn same_camera(a: &View, b: &View) -> bool {
     let (pa, pb) = (a.camera.vehicle_from_camera, b.camera.vehicle_from_camera);
     let turned = (pa.rotation - pb.rotation).to_cols_array().iter().fold(0.0f64, |m, x| m.max(x.abs()));
@@ -53,16 +112,16 @@ fn same_camera(a: &View, b: &View) -> bool {
         && Camera { vehicle_from_camera: pa, ..b.camera } == a.camera
 }
 
-/// The depth source that was asked for, for views that all have depth or not.
-pub(super) fn prior(asked: PriorChoice, all_have_depth: bool) -> PriorChoice {
-    match asked {
+/// The prior that `Auto` stands for, by whether all views have depth.
+pub(super) fn prior(requested: PriorChoice, all_have_depth: bool) -> PriorChoice {
+    match requested {
         PriorChoice::Auto if all_have_depth => PriorChoice::Given,
         PriorChoice::Auto => PriorChoice::Shape,
         chosen => chosen,
     }
 }
 
-/// Why no pixel became a Gaussian, the most frequent reason first.
+/// An explanation why no pixel became a Gaussian, the most frequent reason first.
 pub(super) fn nothing_kept(left_out: &[LeftOut]) -> String {
     let mut pixels: Vec<&LeftOut> = left_out.iter().filter(|l| l.what == "pixels").collect();
     pixels.sort_by_key(|l| std::cmp::Reverse(l.count));
@@ -73,8 +132,8 @@ pub(super) fn nothing_kept(left_out: &[LeftOut]) -> String {
     )
 }
 
-/// The SH degree that the directions the vehicle is seen from can support: none for one direction; bands of
-/// degree l bend over angles of about pi / l, so a narrow fan of views determines low bands only.
+/// The SH degree that the viewing directions support: 0 for a single direction. Bands of degree l vary over angles of
+/// about pi / l, so a narrow fan of views determines low bands only.
 pub(super) fn sh_degree(
     views: &[View],
     geometry: &Geometry,
@@ -102,27 +161,28 @@ pub(super) fn sh_degree(
     degree
 }
 
-/// A size that the caller gave and the prior did not need.
-pub(super) fn note_size(left_out: &mut Vec<LeftOut>, is_known: bool, geometry: &Geometry) {
+/// Notes a size that the caller gave and the prior did not need.
+pub(super) fn note_size(left_out: &mut Vec<LeftOut>, plan: &Plan, geometry: &Geometry) {
     let why = match geometry.working_box {
         Some(WorkingBox { source: BoxSource::Given, .. }) => return,
         Some(WorkingBox { contradicted_m, .. }) if contradicted_m > 0.0 => {
             format!("the silhouettes contradict it by {contradicted_m:.2} m")
         }
         Some(_) => format!("the silhouettes bound the vehicle as closely, to {TELLING_M} m"),
-        None => "the depth is given, not estimated".into(),
+        None => plan.source.why_unused(),
     };
-    note(left_out, "vehicle size", &why, usize::from(is_known));
+    note(left_out, "vehicle size", &why, usize::from(plan.known_box.is_some()));
 }
 
-/// Points of a cloud of `count` that moved no surface.
-pub(super) fn note_cloud(left_out: &mut Vec<LeftOut>, count: usize, fit: Option<PointFit>) {
+/// Notes the points, of `count`, that the surface was not fitted to.
+pub(super) fn note_cloud(left_out: &mut Vec<LeftOut>, plan: &Plan, count: usize, fit: Option<PointFit>) {
     match fit {
         Some(fit) => note(left_out, "points", "outside the silhouettes: not the vehicle's", fit.outside),
-        None => note(left_out, "points", "the depth is given, not estimated", count),
+        None => note(left_out, "points", &plan.source.why_unused(), count),
     }
 }
 
+/// Adds an omission of `count` things to the report, unless it is 0.
 pub(super) fn note(left_out: &mut Vec<LeftOut>, what: &str, why: &str, count: usize) {
     if count > 0 {
         left_out.push(LeftOut { what: what.into(), why: why.into(), count });

@@ -1,9 +1,14 @@
-//! What a reconstruction did, how long it took, what it left out, and the error it can know.
+//! The report: what a reconstruction did, how long it took, what it left out, and its error in the input views.
 
 use super::budget::BudgetPlan;
-use super::options::Options;
+use super::check::Checked;
+use super::frame::InFrame;
+use super::method::Method;
+use super::prior::Surface;
+use super::run::{Reconstruction, Run};
 use super::size::VehicleSize;
-use super::verdict::{Evidence, Reason, Verdict};
+use super::symmetry::Symmetry;
+use super::verdict::{self, Evidence, Reason, Verdict};
 use crate::calibrate::Calibration;
 use crate::prior::{BoxSource, Filled, NetworkFit, PhotoFit, PointFit, WorkingBox};
 use crate::refine::Refinement;
@@ -15,21 +20,21 @@ use std::time::Instant;
 /// One stage of the run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Stage {
-    /// plan, undistort, calibrate, prior, pixels, head, symmetry, refine, check; of a baseline plan, undistort, start,
+    /// plan, undistort, calibrate, prior, pixels, head, symmetry, refine, check; for a baseline plan, undistort, start,
     /// refine, check.
     pub name: &'static str,
     /// Wall time, milliseconds.
     pub ms: f64,
 }
 
-/// Something the scene did not need.
+/// Work that the scene did not need.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct LeftOut {
-    /// What: views, calibration, pixels, SH bands, clones.
+    /// The kind: views, calibration, pixels, SH bands, clones and others.
     pub what: String,
-    /// Why it is not needed.
+    /// The reason.
     pub why: String,
-    /// How many.
+    /// The number of things left out.
     pub count: usize,
 }
 
@@ -38,14 +43,14 @@ pub struct LeftOut {
 pub struct InputError {
     /// Full frame, dB; mean over the views.
     pub psnr_db: f64,
-    /// Alpha >= 0.5 against the mask; mean over the views.
+    /// Intersection over union of alpha >= 0.5 and the mask; mean over the views.
     pub silhouette_iou: f64,
-    /// The part of the mask that is drawn with alpha >= 0.5, 0 to 1; the least of the views.
+    /// Share of the mask that is drawn with alpha >= 0.5, 0 to 1; smallest of the views.
     pub mask_covered: f64,
 }
 
 impl InputError {
-    /// Over several views; `None` without any.
+    /// The error over several views; `None` without any.
     pub(super) fn over(errors: impl ExactSizeIterator<Item = Self>) -> Option<Self> {
         let n = errors.len();
         let start = Self { psnr_db: 0.0, silhouette_iou: 0.0, mask_covered: 1.0 };
@@ -63,14 +68,14 @@ impl InputError {
 pub struct CheckedView {
     /// The view's name.
     pub name: String,
-    /// Drawn by the camera that was used: the calibration's, where it moved the camera.
+    /// Errors of the picture by the camera that was used, which the calibration may have moved.
     #[serde(flatten)]
     pub errors: InputError,
-    /// Drawn by the caller's own camera.
+    /// Errors of the picture by the caller's own camera.
     pub by_given_camera: InputError,
 }
 
-/// The box the prior looked for the vehicle in.
+/// The box that the prior searched for the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BoxReport {
     /// `given` or `estimated`.
@@ -79,7 +84,7 @@ pub struct BoxReport {
     pub size_m: [f64; 3],
     /// Lowest corner, metres.
     pub low_m: [f64; 3],
-    /// By how much the size that the caller gave and the silhouettes contradict each other, metres; 0 where they agree.
+    /// Contradiction between the caller's size and the silhouettes, metres; 0 where they agree.
     pub contradicted_m: f64,
 }
 
@@ -89,20 +94,20 @@ impl From<WorkingBox> for BoxReport {
     }
 }
 
-/// The whole report; `serde_json` writes it.
+/// The whole report, written by `serde_json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// Version of this library.
     pub version: &'static str,
-    /// Depth source that was used; none for a baseline.
+    /// Name of the depth source; `none` for a baseline.
     pub prior: &'static str,
-    /// Gaussian head that was used; of a baseline its name.
+    /// Name of the Gaussian head, or of the baseline.
     pub head: &'static str,
     /// Wall time of each stage, in order.
     pub stages: Vec<Stage>,
     /// Wall time of the whole call, milliseconds.
     pub total_ms: f64,
-    /// Highest resident memory of the process so far, bytes; `None` where the system does not tell.
+    /// Peak resident memory of the process so far, bytes; `None` where the system does not report it.
     pub peak_rss_bytes: Option<u64>,
     /// Worker threads.
     pub threads: usize,
@@ -114,48 +119,96 @@ pub struct Report {
     pub extent_m: Option<([f32; 3], [f32; 3])>,
     /// Names of the views that were used.
     pub views_used: Vec<String>,
-    /// How the cameras were corrected; `None` if that was switched off or these views cannot be calibrated.
+    /// The correction of the cameras; `None` if it was switched off or these views cannot be calibrated.
     pub calibration: Option<Calibration>,
-    /// How long, wide and high the vehicle is; `None` for a baseline.
+    /// Length, width and height of the vehicle; `None` for a baseline.
     pub vehicle: Option<VehicleSize>,
-    /// The box the prior looked for the vehicle in, which is larger, in the corrected frame: its sides are parallel to the
-    /// plane of symmetry. The box a baseline's first Gaussians were drawn from.
+    /// The box that the prior searched for the vehicle, which is larger than the vehicle, in the corrected frame: its
+    /// sides are parallel to the plane of symmetry. For a baseline, the box that the first Gaussians were drawn from.
     pub working_box: Option<BoxReport>,
-    /// What the prior made of the scene's cloud.
+    /// How the prior's surface was fitted to the scene's cloud.
     pub cloud: Option<PointFit>,
-    /// What the photographs said of the prior's surface, where they were asked.
+    /// How the prior's surface was moved to where the photographs agree, where that was switched on.
     pub photo: Option<PhotoFit>,
-    /// How the prior closed what its surface left open of the masks.
+    /// How the prior's surface was extended to fill the masks.
     pub masks: Option<Filled>,
-    /// What the network said whose depth was taken, and how far it agrees with the cameras.
+    /// The depth network, and how far its answer agrees with the cameras.
     pub network: Option<NetworkFit>,
-    /// How the options were chosen, where the caller gave a budget.
+    /// How the options were chosen, where the caller set a budget.
     pub plan: Option<BudgetPlan>,
     /// Work this scene did not need.
     pub left_out: Vec<LeftOut>,
-    /// What is legal but looks like a mistake, or did not turn out as it was asked for, one sentence each.
+    /// Input that is legal but looks like a mistake, and requests that could not be met, one sentence each.
     pub warnings: Vec<String>,
     /// How the unseen side was completed.
     pub symmetry: Completion,
     /// The light of the unseen side, where it was estimated.
     pub relight: Option<Relighting>,
-    /// What the optimisation did, where it was asked for.
+    /// Report of the optimisation, where it was switched on.
     pub refinement: Option<Refinement>,
     /// Error on the input views, drawn by the cameras that were used, unless the check was switched off.
     pub input_error: Option<InputError>,
-    /// The same, drawn by the caller's own cameras; it differs where the calibration moved them.
+    /// Error on the input views, drawn by the caller's own cameras; it differs where the calibration moved them.
     pub input_error_by_given_cameras: Option<InputError>,
     /// The errors of each used view, in the order of `views_used`; empty if the check was switched off.
     pub input_views: Vec<CheckedView>,
-    /// Whether the model is to be believed.
+    /// Whether the model can be trusted.
     pub verdict: Verdict,
-    /// Why the verdict is not good, the heaviest reason first.
+    /// Why the verdict is not good, the most severe reason first.
     pub verdict_reasons: Vec<Reason>,
     /// The numbers that the verdict rests on.
     pub evidence: Evidence,
-    /// The options of the call; where it had a budget, those that were chosen: with them and without a budget another
-    /// call does the same.
-    pub settings: Options,
+    /// The method and its settings; where there was a budget, the settings that were chosen. Another call with them,
+    /// and without a budget, does the same.
+    pub settings: Method,
+}
+
+/// The result of a run whose stages are done.
+pub(super) fn finished(mut run: Run) -> Reconstruction {
+    let Checked { gaussians, points, size, evidence, input_views, reasons } = run.checked.take();
+    let Surface { prior, geometry, report: found, .. } = run.surface.take();
+    let Symmetry { completion, relighting, .. } = run.symmetry.take();
+    let plan = run.plan.take();
+    let views = run.views.take();
+    let gaussians = gaussians.into_inner();
+    let (stages, total_ms) = run.clock.finish();
+    let budget = plan.budget.map(|budget| budget.after(&stages));
+    let mut warnings = run.warnings;
+    warnings.extend(budget.as_ref().and_then(BudgetPlan::warning));
+    let report = Report {
+        version: env!("CARGO_PKG_VERSION"),
+        prior,
+        head: *run.head,
+        stages,
+        total_ms,
+        peak_rss_bytes: peak_rss_bytes(),
+        threads: run.context.threads(),
+        gaussians: gaussians.len(),
+        sh_degree: gaussians.sh_degree(),
+        extent_m: gaussians.bounds(),
+        views_used: views.in_given_frame().iter().map(|v| v.name.clone()).collect(),
+        calibration: views.report,
+        vehicle: size,
+        working_box: geometry.working_box.map(Into::into),
+        cloud: found.points,
+        photo: found.photo,
+        masks: found.masks,
+        network: found.network,
+        plan: budget,
+        left_out: run.left_out,
+        warnings,
+        symmetry: completion,
+        relight: relighting,
+        refinement: run.refinement.take(),
+        input_error: InputError::over(input_views.iter().map(|view| view.errors)),
+        input_error_by_given_cameras: InputError::over(input_views.iter().map(|view| view.by_given_camera)),
+        input_views,
+        verdict: verdict::verdict(&reasons, plan.options.check),
+        verdict_reasons: reasons,
+        evidence,
+        settings: Method::Vehicle(plan.options),
+    };
+    Reconstruction { gaussians, points: points.map(InFrame::into_inner), report }
 }
 
 /// Times the stages.
@@ -188,7 +241,7 @@ impl Clock {
     }
 }
 
-/// Highest resident memory of this process, bytes, from Linux's own account of it.
+/// Peak resident memory of this process, bytes, from Linux's status file.
 pub(super) fn peak_rss_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;

@@ -1,10 +1,10 @@
-//! The vehicle's own length, width and height, which are not those of the box it was looked for in.
+//! The length, width and height of the vehicle, which are smaller than those of the working box.
 
 use crate::prior::{Ends, Geometry};
 use serde::Serialize;
 use vg_splat::Gaussians;
 
-/// Part of the Gaussians beyond each end that is not believed: strays.
+/// Share of the Gaussians at each end that are ignored as strays.
 const STRAYS: f64 = 2e-4;
 
 /// Error of an end that was measured as depth, metres: a pixel's footprint and the noise of a scan.
@@ -13,10 +13,10 @@ const MEASURED_M: f64 = 0.02;
 /// Width of two outer mirrors, which an estimated surface often lacks, metres.
 const MIRRORS_M: f64 = 0.2;
 
-/// How long, wide and high the vehicle is.
+/// Length, width and height of the vehicle.
 ///
-/// An estimated surface is measured whole, which is closed also where no view looked; measured depth by its
-/// Gaussians. Outer mirrors are thin, and often missing from both: then the width is the body's.
+/// An estimated surface is closed, so its own ends are measured; measured depth gives the ends of its Gaussians. Outer
+/// mirrors are thin and often missing from both: the width is then that of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct VehicleSize {
     /// Length, width, height, metres.
@@ -31,7 +31,7 @@ impl VehicleSize {
         let ends = geometry.ends.or_else(|| ends(gaussians))?;
         let mirrors = if geometry.ends.is_some() { MIRRORS_M } else { 0.0 };
         let error = |k: usize| match k {
-            // One side is the mirror image of the other, and so is its error.
+            // The sides mirror each other, and so do their errors: they add up.
             1 => (ends.error_m[1][0] + ends.error_m[1][1]).hypot(mirrors),
             k => ends.error_m[k][0].hypot(ends.error_m[k][1]),
         };
@@ -42,7 +42,7 @@ impl VehicleSize {
     }
 }
 
-/// Where Gaussians that show measured depth end.
+/// The ends of Gaussians that show measured depth.
 fn ends(gaussians: &Gaussians) -> Option<Ends> {
     let strays = (STRAYS * gaussians.len() as f64) as usize;
     let mut ends = Ends { low: [0.0; 3], high: [0.0; 3], error_m: [[MEASURED_M; 2]; 3] };

@@ -1,17 +1,17 @@
-//! Which views to keep where not all may be used: those that see the vehicle from the most different sides.
+//! The choice of views where not all may be used: those that show the vehicle from the most different directions.
 
 use crate::prior::volume::whereabouts;
 use glam::DVec3;
 use vg_geometry::MIRROR_Y;
 use vg_scene::{Mask, View};
 
-/// Positions in `views` of at most `most`, in order. A view and its mirrored twin show the same, so directions
-/// are compared across y = 0 as well.
+/// Ascending indices of at most `most` views. A view and its mirrored twin show the same, so directions are compared
+/// across y = 0 as well.
 pub(super) fn spread(views: &[View], most: usize) -> Vec<usize> {
     if views.len() <= most {
         return (0..views.len()).collect();
     }
-    // Where nothing tells where the vehicle is, it is at the origin of its own frame.
+    // Without masks the vehicle is taken to be at the origin of its frame.
     let middle = whereabouts(views).map_or(DVec3::ZERO, |(middle, _)| middle);
     let directions: Vec<DVec3> =
         views.iter().map(|v| (v.camera.center() - middle).normalize_or(DVec3::X)).collect();
@@ -20,7 +20,7 @@ pub(super) fn spread(views: &[View], most: usize) -> Vec<usize> {
         let (a, b) = (directions[a], directions[b]);
         a.angle_between(b).min(a.angle_between(b * mirror))
     };
-    // The view that shows most of the vehicle first, then always the one farthest from all that were taken.
+    // The view with the most vehicle pixels first, then always the one farthest from those chosen.
     let shown = |i: usize| views[i].mask.as_ref().map_or(0, Mask::vehicle_pixels);
     let largest = (0..views.len()).rev().max_by_key(|&i| shown(i)).unwrap_or(0);
     let mut taken = vec![largest];
@@ -52,7 +52,7 @@ mod tests {
     }
 
     #[test]
-    fn views_that_are_alike_go_first_and_a_mirrored_twin_is_alike() {
+    fn similar_views_are_left_out_first_and_mirrored_twins_are_similar() {
         let views = [10.0, 12.0, -11.0, 90.0, 88.0, 170.0].map(from);
         assert_eq!(spread(&views, 3), [0, 3, 5]);
         assert_eq!(spread(&views, 1), [0]);

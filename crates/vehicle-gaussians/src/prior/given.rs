@@ -1,6 +1,6 @@
 //! Depth that the caller measured: LiDAR, a depth camera, or any model run elsewhere.
 
-use super::{DepthPrior, Geometry};
+use super::{DepthPrior, Estimate, Geometry};
 use vg_geometry::progress::Context;
 use vg_geometry::{Error, Result};
 use vg_scene::View;
@@ -14,7 +14,7 @@ impl DepthPrior for GivenDepth {
         "given"
     }
 
-    fn estimate(&self, views: &[View], _context: &Context) -> Result<Geometry> {
+    fn estimate(&self, views: &[View], _context: &Context) -> Result<Estimate> {
         let depth_of = |(i, view): (usize, &View)| {
             view.depth.clone().ok_or_else(|| {
                 Error::argument(
@@ -25,6 +25,6 @@ impl DepthPrior for GivenDepth {
             })
         };
         let depths = views.iter().enumerate().map(depth_of).collect::<Result<_>>()?;
-        Ok(Geometry::new(depths, None))
+        Ok(Geometry::new(depths, None).into())
     }
 }

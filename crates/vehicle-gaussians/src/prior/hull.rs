@@ -13,7 +13,7 @@
 use super::volume::{
     Field, KnownBox, Silhouette, fill_masks, find_box, fit_cloud, inside_all, inside_box, march,
 };
-use super::{DepthPrior, Ends, Geometry, WorkingBox};
+use super::{DepthPrior, Ends, Estimate, Geometry, PriorReport, WorkingBox};
 use rayon::prelude::*;
 use vg_geometry::progress::Context;
 use vg_geometry::{Error, Result};
@@ -52,7 +52,7 @@ impl DepthPrior for HullPrior {
         "hull"
     }
 
-    fn estimate(&self, views: &[View], context: &Context) -> Result<Geometry> {
+    fn estimate(&self, views: &[View], context: &Context) -> Result<Estimate> {
         require_masks(views)?;
         let silhouettes: Vec<Silhouette> =
             context.parallel(|| views.par_iter().map(Silhouette::new).collect());
@@ -76,7 +76,10 @@ impl DepthPrior for HullPrior {
             context.report("prior", 0.6 + 0.4 * (i + 1) as f64 / views.len() as f64)?;
         }
         let ends = context.parallel(|| Ends::of_field(&field, |_| END_ERROR_M));
-        Ok(Geometry { points, ends, masks: Some(masks), ..Geometry::new(depths, Some(working_box)) })
+        Ok(Estimate {
+            geometry: Geometry { ends, ..Geometry::new(depths, Some(working_box)) },
+            report: PriorReport { points, masks: Some(masks), ..PriorReport::default() },
+        })
     }
 }
 

@@ -22,53 +22,97 @@ use vg_geometry::progress::Context;
 use vg_scene::visibility::Observer;
 use vg_scene::{DepthMap, View};
 
-/// A source of metric depth.
+/// A source of metric depth. Implement it to reconstruct with a prior of your own, see
+/// [`crate::pipeline::reconstruct_with`].
+///
+/// ```
+/// use vg::prior::{DepthPrior, Estimate, Geometry};
+/// use vg::progress::Context;
+/// use vg::scene::{DepthMap, View};
+///
+/// /// A wall at a fixed distance from every camera.
+/// struct Wall {
+///     depth_m: f32,
+/// }
+///
+/// impl DepthPrior for Wall {
+///     fn name(&self) -> &'static str {
+///         "wall"
+///     }
+///
+///     fn estimate(&self, views: &[View], _context: &Context) -> vg::Result<Estimate> {
+///         let depth = |view: &View| {
+///             let (width, height) = (view.camera.width, view.camera.height);
+///             DepthMap::new(width, height, vec![self.depth_m; width as usize * height as usize])
+///         };
+///         let depths = views.iter().map(depth).collect::<vg::Result<_>>()?;
+///         Ok(Geometry::new(depths, None).into())
+///     }
+/// }
+/// ```
 pub trait DepthPrior {
-    /// Name in options and reports.
+    /// Name in reports and error messages.
     fn name(&self) -> &'static str;
 
-    /// One depth map per view, in the view's pinhole grid, metres. Views are undistorted.
-    fn estimate(&self, views: &[View], context: &Context) -> Result<Geometry>;
+    /// Estimates one depth map per view, in the order and the size of the views; 0 where a pixel has no depth.
+    ///
+    /// The views are pinholes: lens distortion is removed. Their cameras are posed in the frame that the run works in,
+    /// whose y = 0 is the vehicle's plane of symmetry; the calibration may have moved it from the caller's frame. Long
+    /// work should call [`Context::report`] with the stage `"prior"` now and then, and return its error, which is how a
+    /// caller cancels. [`Context::parallel`] runs rayon's iterators on the threads of the run.
+    fn estimate(&self, views: &[View], context: &Context) -> Result<Estimate>;
 }
 
-/// What a prior knows of the vehicle's shape.
+/// The answer of a prior.
 #[derive(Clone, Debug)]
-pub struct Geometry {
-    /// One per view.
-    pub depths: Vec<DepthMap>,
-    /// Unit normals per view in the camera frame, see [`normals::normals`]; filled by
-    /// [`Geometry::find_normals`].
-    pub normals: Vec<Vec<Vec3>>,
-    /// The box it worked in.
-    pub working_box: Option<WorkingBox>,
-    /// Where its surface ends, if it estimates a whole one.
-    pub ends: Option<Ends>,
-    /// What it made of the scene's cloud, where there is one and it has a use for it.
+pub struct Estimate {
+    /// Where the surface is.
+    pub geometry: Geometry,
+    /// The prior's own report.
+    pub report: PriorReport,
+}
+
+impl From<Geometry> for Estimate {
+    fn from(geometry: Geometry) -> Self {
+        Self { geometry, report: PriorReport::default() }
+    }
+}
+
+/// A prior's report of its own work; later stages do not read it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PriorReport {
+    /// How the surface was fitted to the points of the scene's cloud; `None` without a cloud or for a prior that does
+    /// not use it.
     pub points: Option<PointFit>,
-    /// What the photographs said of the surface, where they were asked.
+    /// How the surface was moved to where the photographs agree.
     pub photo: Option<PhotoFit>,
-    /// How it closed what its surface left open of the masks, where it does.
+    /// How the surface was extended to fill the masks.
     pub masks: Option<Filled>,
-    /// What a network said, where one was asked.
+    /// How far the network's answer agrees with the caller's cameras.
     pub network: Option<NetworkFit>,
 }
 
+/// The shape of the vehicle, as estimated or measured from the views.
+#[derive(Clone, Debug)]
+pub struct Geometry {
+    /// One map per view.
+    pub depths: Vec<DepthMap>,
+    /// Unit normals per view in the camera frame, see [`normals::normals`]. Where a prior leaves the list empty,
+    /// [`Geometry::find_normals`] computes them from the depth.
+    pub normals: Vec<Vec<Vec3>>,
+    /// The box that the vehicle was looked for in.
+    pub working_box: Option<WorkingBox>,
+    /// The ends of the surface, where the prior estimates a whole one.
+    pub ends: Option<Ends>,
+}
+
 impl Geometry {
-    /// Depth without normals yet.
+    /// Depth without normals and ends.
     pub fn new(depths: Vec<DepthMap>, working_box: Option<WorkingBox>) -> Self {
-        Self {
-            depths,
-            normals: Vec::new(),
-            working_box,
-            ends: None,
-            points: None,
-            photo: None,
-            masks: None,
-            network: None,
-        }
+        Self { depths, normals: Vec::new(), working_box, ends: None }
     }
 
-    /// About the middle of what the views see, vehicle frame, metres: the mean of some lifted pixels.
+    /// Approximate middle of the observed surface in the frame of the views, metres: the mean of some lifted pixels.
     pub fn middle(&self, views: &[View]) -> DVec3 {
         /// A prime, so that the samples do not line up in columns.
         const EVERY: usize = 97;
@@ -83,12 +127,12 @@ impl Geometry {
         if count > 0.0 { sum / count } else { DVec3::ZERO }
     }
 
-    /// The views with their depth, for look-ups.
+    /// The views with their depth, for visibility queries.
     pub fn observers<'a>(&'a self, views: &'a [View]) -> Vec<Observer<'a>> {
         views.iter().zip(&self.depths).map(|(view, depth)| Observer::new(view, depth)).collect()
     }
 
-    /// Normals from depth, where the prior gave none.
+    /// Computes normals from the depth where the prior gave none.
     pub fn find_normals(&mut self, views: &[View], context: &Context) {
         if self.normals.is_empty() {
             let pairs = views.iter().zip(&self.depths);
@@ -98,7 +142,7 @@ impl Geometry {
     }
 }
 
-/// Where a surface begins and ends along each axis.
+/// The ends of a surface along each axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ends {
     /// Lowest x, y, z, metres.
@@ -110,7 +154,7 @@ pub struct Ends {
 }
 
 impl Ends {
-    /// The ends of a field's zero surface, which is expected to be off by `error_m` at a point.
+    /// The ends of a field's zero surface; `error_m` returns the expected error of the surface at a point.
     pub(crate) fn of_field(field: &volume::Field, error_m: impl Fn(Vec3) -> f64) -> Option<Self> {
         let ends = field.surface_ends()?;
         Some(Self {
@@ -121,21 +165,21 @@ impl Ends {
     }
 }
 
-/// The box that a prior looks for the vehicle in: axis-aligned in the vehicle frame, symmetric about y = 0, and larger
-/// than the vehicle by what the silhouettes leave open.
+/// The box that a prior searches for the vehicle: axis-aligned in the vehicle frame, symmetric about y = 0, and larger
+/// than the vehicle by what the silhouettes do not bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WorkingBox {
     /// Lowest corner, metres.
     pub low: [f64; 3],
     /// Highest corner, metres.
     pub high: [f64; 3],
-    /// What bounds it.
+    /// The source of its bounds.
     pub source: BoxSource,
-    /// By how much the known size and the silhouettes contradict each other, metres; 0 where they agree.
+    /// Contradiction between the known size and the silhouettes, metres; 0 where they agree.
     pub contradicted_m: f64,
 }
 
-/// Where a [`WorkingBox`] comes from.
+/// The source of a [`WorkingBox`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum BoxSource {
@@ -145,17 +189,17 @@ pub enum BoxSource {
     Estimated,
 }
 
-/// A size that is contradicted by less is within what masks and poses are off by, metres.
-const CONTRADICTION_TOLD_M: f64 = 0.05;
+/// Contradictions below this are within the errors of masks and poses, metres.
+const REPORTED_CONTRADICTION_M: f64 = 0.05;
 
 impl WorkingBox {
-    /// What a caller should know whose size the silhouettes contradict.
+    /// A sentence for the caller where the silhouettes contradict the given size.
     pub fn warning(&self) -> Option<String> {
         let use_made = match self.source {
             BoxSource::Given => "it was used all the same",
             BoxSource::Estimated => "it was not used",
         };
-        (self.contradicted_m > CONTRADICTION_TOLD_M).then(|| {
+        (self.contradicted_m > REPORTED_CONTRADICTION_M).then(|| {
             format!(
                 "the vehicle's size that was given and the silhouettes contradict each other by {:.2} m: {use_made}; check the \
                  size (length, width, height), the masks and the poses",

@@ -16,7 +16,7 @@ mod options;
 mod parameters;
 mod plan;
 mod target;
-pub(crate) mod tie;
+mod tie;
 mod work;
 
 pub use densify::{Densified, Densify};
@@ -24,13 +24,13 @@ pub use model::{model, model_on};
 pub use options::{Amount, RefineOptions};
 pub use parameters::Rates;
 
+use crate::symmetry::MirrorClone;
 use exposure::Exposure;
 use parameters::Parameters;
 use plan::Plan;
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::time::Instant;
-use tie::Clone as Tied;
 use vg_geometry::Result;
 use vg_geometry::progress::Context;
 use vg_scene::View;
@@ -100,7 +100,7 @@ const LAST_RATE: f32 = 0.1;
 /// ones, which follow their originals. Views are pinholes in the frame whose plane of symmetry is y = 0.
 pub(crate) fn refine(
     mut gaussians: Gaussians,
-    clones: &[Tied],
+    clones: &[MirrorClone],
     views: &[View],
     options: &RefineOptions,
     context: &Context,
@@ -196,12 +196,12 @@ struct State {
     /// Parameters of the originals.
     parameters: Parameters,
     /// Clones that follow the originals.
-    clones: Vec<Tied>,
+    clones: Vec<MirrorClone>,
     exposure: Exposure,
 }
 
 impl State {
-    fn new(originals: &Gaussians, clones: &[Tied], views: usize) -> Self {
+    fn new(originals: &Gaussians, clones: &[MirrorClone], views: usize) -> Self {
         let parameters = Parameters::from_gaussians(originals);
         Self { parameters, clones: clones.to_vec(), exposure: Exposure::new(views) }
     }

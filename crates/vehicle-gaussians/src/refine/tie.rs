@@ -2,25 +2,17 @@
 //! its own side. Gradients of both move the original.
 
 use super::parameters::{Parameters, sigmoid};
+use crate::symmetry::MirrorClone;
 use rayon::prelude::*;
 use vg_splat::gaussians::buffer::ArraysMut;
 use vg_splat::gaussians::{Gaussians, sh};
 use vg_splat::render::Gradients;
 
-/// A Gaussian that is the mirror image of another.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Clone {
-    /// Index of the original.
-    pub(crate) of: u32,
-    /// Factor on the stored colour, per channel (`relight`).
-    pub(crate) gain: [f32; 3],
-}
-
 /// Gaussians per task.
 const CHUNK: usize = 1 << 12;
 
 /// Computes the Gaussians of these parameters: the originals in order, then the clones.
-pub(super) fn made(parameters: &Parameters, clones: &[Clone], out: &mut Gaussians) {
+pub(super) fn made(parameters: &Parameters, clones: &[MirrorClone], out: &mut Gaussians) {
     let n = parameters.len();
     let stride = parameters.stride();
     let ArraysMut { means, rotations, scales, opacities, sh } =
@@ -64,7 +56,7 @@ pub(super) fn made(parameters: &Parameters, clones: &[Clone], out: &mut Gaussian
 
 /// Adds the clones' gradients to those of their originals, which come first; the adjoint of [`made`]. Each original has
 /// at most one clone, so the order does not matter.
-pub(super) fn gather(gradients: &mut Gradients, clones: &[Clone], n: usize, sh_degree: u8) {
+pub(super) fn gather(gradients: &mut Gradients, clones: &[MirrorClone], n: usize, sh_degree: u8) {
     let stride = 3 * sh::coefficients(sh_degree);
     let signs = vg_splat::gaussians::mirror::sh_signs(sh_degree);
     let add = |to: &mut f32, from: f32| *to = (*to + from).clamp(-f32::MAX, f32::MAX);
@@ -96,10 +88,11 @@ pub(super) fn gather(gradients: &mut Gradients, clones: &[Clone], n: usize, sh_d
 }
 
 /// The clones after a growth: each new Gaussian has one if its source in `sources` had one.
-pub(super) fn followed(clones: &[Clone], sources: &[u32], originals: usize) -> Vec<Clone> {
+pub(super) fn followed(clones: &[MirrorClone], sources: &[u32], originals: usize) -> Vec<MirrorClone> {
     let mut gains: Vec<Option<[f32; 3]>> = vec![None; originals];
     clones.iter().for_each(|clone| gains[clone.of as usize] = Some(clone.gain));
-    let tied = |(i, source): (usize, &u32)| gains[*source as usize].map(|gain| Clone { of: i as u32, gain });
+    let tied =
+        |(i, source): (usize, &u32)| gains[*source as usize].map(|gain| MirrorClone { of: i as u32, gain });
     sources.iter().enumerate().filter_map(tied).collect()
 }
 
@@ -131,10 +124,10 @@ mod tests {
         }
     }
 
-    const CLONES: [Clone; 3] = [
-        Clone { of: 4, gain: [1.0, 1.0, 1.0] },
-        Clone { of: 0, gain: [0.5, 1.25, 2.0] },
-        Clone { of: 2, gain: [0.9, 0.8, 0.7] },
+    const CLONES: [MirrorClone; 3] = [
+        MirrorClone { of: 4, gain: [1.0, 1.0, 1.0] },
+        MirrorClone { of: 0, gain: [0.5, 1.25, 2.0] },
+        MirrorClone { of: 2, gain: [0.9, 0.8, 0.7] },
     ];
 
     #[test]
@@ -167,9 +160,9 @@ mod tests {
     #[test]
     fn clones_come_and_go_with_their_originals() {
         let expected = [
-            Clone { of: 0, gain: CLONES[2].gain },
-            Clone { of: 2, gain: CLONES[0].gain },
-            Clone { of: 3, gain: CLONES[0].gain },
+            MirrorClone { of: 0, gain: CLONES[2].gain },
+            MirrorClone { of: 2, gain: CLONES[0].gain },
+            MirrorClone { of: 3, gain: CLONES[0].gain },
         ];
         assert_eq!(followed(&CLONES, &[2, 3, 4, 4], 5), expected);
         assert_eq!(followed(&CLONES, &[1, 3], 5), []);
@@ -207,7 +200,7 @@ mod tests {
         other.log_scales = threes(n, 23);
         other.logits = numbers(n, 24);
         other.sh = numbers(n * stride, 25);
-        let difference = |clones: &[Clone], of: &Gradients| {
+        let difference = |clones: &[MirrorClone], of: &Gradients| {
             let (mut x, mut y) = (Gaussians::default(), Gaussians::default());
             made(&some(n, degree), clones, &mut x);
             made(&other, clones, &mut y);

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use std::ops::ControlFlow;
 use vg::onnx::Model;
 use vg::pipeline::{Calibrate, Options, PriorChoice, Reconstruction, reconstruct};
-use vg::prior::{DepthPrior, Geometry, NetworkPrior};
+use vg::prior::{DepthPrior, Estimate, Geometry, NetworkPrior};
 use vg::progress::{Context, Threads};
 use vg::{Result, Scene};
 use vg_testing::networks::oracle::{Manner, ellipsoid};
@@ -27,7 +27,7 @@ fn run(scene: &Scene, model: &Model) -> Result<Reconstruction> {
     reconstruct(scene, &options(model), &mut |_| ControlFlow::Continue(()))
 }
 
-fn estimate(scene: &Scene, model: &Model) -> Result<Geometry> {
+fn estimate(scene: &Scene, model: &Model) -> Result<Estimate> {
     let threads = Threads::new(2)?;
     let mut callback = |_| ControlFlow::Continue(());
     let context = Context::new(&threads, &mut callback);
@@ -78,10 +78,10 @@ fn depth_is_exact_in_every_convention() {
         let manner = Manner { along_ray, is_metric, unit };
         let graph = ellipsoid(&scene.views[0].camera, WIDTH.into(), HEIGHT.into(), manner);
         let Some(model) = open(&format!("manner{k}"), &graph) else { return };
-        let geometry = estimate(&scene, &model).unwrap();
+        let Estimate { geometry, report } = estimate(&scene, &model).unwrap();
         let (error, count) = worst(&scene, &geometry);
         assert!(error < 1e-4 && count > 1000, "{manner:?}: {error:.1e} at {count} pixels");
-        let network = geometry.network.unwrap();
+        let network = report.network.unwrap();
         assert!(network.ray_degrees.unwrap() < 1e-2 && network.warnings.is_empty(), "{network:?}");
         assert_eq!(network.rescaled, !is_metric);
         assert_eq!((network.prior.as_str(), network.size), ("oracle", [WIDTH, HEIGHT]));
@@ -102,7 +102,7 @@ fn pictures_are_scaled_and_cropped_with_their_intrinsics_and_depth_is_resampled_
         let mut graph = ellipsoid(&scene.views[0].camera, 88, 66, Manner::PLAIN);
         graph.say("vg.resize", resize);
         let Some(model) = open(resize, &graph) else { return };
-        let geometry = estimate(&scene, &model).unwrap();
+        let Estimate { geometry, report } = estimate(&scene, &model).unwrap();
         let errors = relative_errors(&scene, &geometry);
         // The ellipsoid is curved between the network's coarser pixels.
         let most = errors[errors.len() * 19 / 20];
@@ -111,7 +111,7 @@ fn pictures_are_scaled_and_cropped_with_their_intrinsics_and_depth_is_resampled_
         let lost =
             (0..72).filter(|v| mask.is_vehicle(10, *v) && geometry.depths[0].get(10, *v).is_none()).count();
         assert_eq!(lost > 10, cut, "{resize}: {lost} pixels of column 10");
-        assert!(geometry.network.unwrap().without_depth >= lost);
+        assert!(report.network.unwrap().without_depth >= lost);
     }
 }
 
@@ -145,11 +145,11 @@ fn cameras_far_from_the_origin_are_never_rounded_to_f32() {
     let mut scene = right_side(WIDTH, HEIGHT);
     let graph = ellipsoid(&scene.views[0].camera, WIDTH.into(), HEIGHT.into(), Manner::PLAIN);
     let Some(model) = open("far", &graph) else { return };
-    let near = estimate(&scene, &model).unwrap();
+    let near = estimate(&scene, &model).unwrap().geometry;
     // Six thousand kilometres, as in ECEF.
     let offset = DVec3::new(4.1e6, 6.2e5, 4.8e6);
     scene.views.iter_mut().for_each(|v| v.camera.vehicle_from_camera.translation += offset);
-    let far = estimate(&scene, &model).unwrap();
+    let far = estimate(&scene, &model).unwrap().geometry;
     assert!(worst(&scene, &near).0 < 1e-4 && worst(&scene, &far).0 < 1e-4);
 }
 
@@ -161,9 +161,9 @@ fn a_metric_network_that_is_off_by_a_tenth_is_corrected_by_its_own_cameras() {
     let mut graph = ellipsoid(&scene.views[0].camera, WIDTH.into(), HEIGHT.into(), manner);
     oracle::set_output(&mut graph, "scale", 1.0);
     let Some(model) = open("tenth", &graph) else { return };
-    let geometry = estimate(&scene, &model).unwrap();
+    let Estimate { geometry, report } = estimate(&scene, &model).unwrap();
     assert!(worst(&scene, &geometry).0 < 1e-4);
-    let network = geometry.network.unwrap();
+    let network = report.network.unwrap();
     assert!(network.rescaled && (network.poses.unwrap().scale - 1.1).abs() < 1e-4);
 }
 
@@ -182,13 +182,13 @@ fn poses_of_other_pictures_give_a_warning_and_rays_of_another_lens_are_refused()
     }
     turned.floats("turn", &[4, 4], &matrix).node("MatMul", &["before", "turn"], "cam_to_ref_pred", &[]);
     let model = open("turned", &turned).unwrap();
-    let network = estimate(&scene, &model).unwrap().network.unwrap();
+    let network = estimate(&scene, &model).unwrap().report.network.unwrap();
     assert!(network.warnings.iter().any(|w| w.contains("12.0 degrees")), "{:?}", network.warnings);
 
     // A network with its own rays: constants of the right lens, while the caller's is another.
     let i = &mut scene.views[1].camera.intrinsics;
     (i.fx, i.fy) = (2.0 * i.fx, 2.0 * i.fy);
-    let network = estimate(&scene, &right).unwrap().network.unwrap();
+    let network = estimate(&scene, &right).unwrap().report.network.unwrap();
     // The test graph uses the given intrinsics: rays agree, views do not.
     assert!(network.ray_degrees.unwrap() < 1e-2);
     let mut fixed = graph;
@@ -221,7 +221,7 @@ fn a_network_without_metres_needs_two_places() {
     let text = estimate(&one, &model).unwrap_err().to_string();
     assert!(text.contains("the vehicle's size cannot be determined"), "{text}");
     let graph = ellipsoid(&one.views[0].camera, WIDTH.into(), HEIGHT.into(), Manner::PLAIN);
-    let network = estimate(&one, &open("metric one", &graph).unwrap()).unwrap().network.unwrap();
+    let network = estimate(&one, &open("metric one", &graph).unwrap()).unwrap().report.network.unwrap();
     assert!(network.warnings.iter().any(|w| w.contains("the network's own scale")), "{:?}", network.warnings);
 }
 
@@ -232,7 +232,7 @@ fn a_view_with_another_scale_is_scaled_to_the_others() {
     graph.rename_output_of("depth", "before");
     graph.floats("off", &[4, 1, 1], &[1.0, 1.08, 1.0, 1.0]).node("Mul", &["before", "off"], "depth", &[]);
     let Some(model) = open("view", &graph) else { return };
-    let fit = estimate(&scene, &model).unwrap().network.unwrap().views.unwrap();
+    let fit = estimate(&scene, &model).unwrap().report.network.unwrap().views.unwrap();
     assert!(fit.after < 0.5 * fit.before, "{fit:?}");
     assert!((fit.scales[1] * 1.08 - 1.0).abs() < 0.03, "{fit:?}");
 }
@@ -248,5 +248,5 @@ fn the_first_camera_gets_the_identity() {
         let pose = &mut view.camera.vehicle_from_camera;
         (pose.rotation, pose.translation) = (turn * pose.rotation, turn * pose.translation);
     }
-    assert!(worst(&scene, &estimate(&scene, &model).unwrap()).0 < 1e-4);
+    assert!(worst(&scene, &estimate(&scene, &model).unwrap().geometry).0 < 1e-4);
 }

@@ -5,7 +5,7 @@ use crate::job::{self, Failure, USAGE};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use vg::onnx::{Model, ModelOptions, Provider};
-use vg::pipeline::{Calibrate, DEFAULT_MAX_GAUSSIANS, Keep, Options, PriorChoice};
+use vg::pipeline::{BaselineRun, Calibrate, DEFAULT_MAX_GAUSSIANS, Keep, Method, Options, PriorChoice};
 use vg::refine::baseline::BaselineOptions;
 use vg::refine::{Amount, Densify, RefineOptions};
 use vg::relight::Relight;
@@ -119,8 +119,8 @@ const CONFLICTS_WITH_BASELINE: [&str; 16] = [
 ];
 
 impl MethodArgs {
-    /// Options for the library; opens the models.
-    pub(crate) fn options(&self) -> job::Result<Options> {
+    /// The method for the library, with its models open.
+    pub(crate) fn method(&self) -> job::Result<Method> {
         let mismatch = match (self.prior == Prior::Onnx, self.prior_model.is_some()) {
             (true, false) => Some("--prior onnx needs a network: --prior-model M.onnx"),
             (false, true) => Some("--prior-model M.onnx is used only with --prior onnx"),
@@ -131,16 +131,19 @@ impl MethodArgs {
         }
         let model = |path: &Path| Model::open(path, &self.model_options());
         let (prior_model, head_model) = (self.prior_model.as_deref(), self.head_model.as_deref());
-        Ok(Options {
-            prior_model: prior_model.map(model).transpose()?,
-            head_model: head_model.map(model).transpose()?,
-            ..self.plain_options()
+        Ok(match self.method_without_models() {
+            Method::Vehicle(options) => Method::Vehicle(Options {
+                prior_model: prior_model.map(model).transpose()?,
+                head_model: head_model.map(model).transpose()?,
+                ..options
+            }),
+            baseline => baseline,
         })
     }
 
     /// Whether all options, apart from those of networks, have their default values.
     pub(crate) fn is_silent(&self) -> bool {
-        self.plain_options() == Options::default() && self.cloud.is_none()
+        self.method_without_models() == Method::Vehicle(Options::default()) && self.cloud.is_none()
     }
 
     /// Options with which networks are opened.
@@ -154,8 +157,31 @@ impl MethodArgs {
         }
     }
 
-    /// Options for the library without models.
-    fn plain_options(&self) -> Options {
+    fn method_without_models(&self) -> Method {
+        match self.baseline {
+            Some(Baseline::GaussianSplatting) => Method::Baseline(self.baseline_run()),
+            None => Method::Vehicle(self.options_without_models()),
+        }
+    }
+
+    fn baseline_run(&self) -> BaselineRun {
+        let default = BaselineOptions::default();
+        BaselineRun {
+            baseline: BaselineOptions {
+                amount: self.refine.unwrap_or(default.amount),
+                sh_degree: self.sh_degree.unwrap_or(default.sh_degree),
+                ..default
+            },
+            vehicle_size: self.vehicle_box.map(|known| known.0.size),
+            vehicle_place: self.vehicle_box.and_then(|known| known.0.place),
+            resolution: self.resolution,
+            max_views: self.max_views,
+            threads: self.threads,
+            ..BaselineRun::default()
+        }
+    }
+
+    fn options_without_models(&self) -> Options {
         let kept = |item: KeepItem| self.keep.contains(&item) || self.keep.contains(&KeepItem::All);
         Options {
             prior: match self.prior {
@@ -200,20 +226,12 @@ impl MethodArgs {
             max_gaussians: Some(self.max_gaussians),
             threads: self.threads,
             points: false,
-            refine: self.refine.filter(|_| self.baseline.is_none()).map(|amount| RefineOptions {
+            refine: self.refine.map(|amount| RefineOptions {
                 amount,
                 hold_out: self.refine_hold_out,
                 densify: self.refine_densify.then(Densify::for_refinement),
                 backend: self.refine_backend,
                 ..RefineOptions::default()
-            }),
-            baseline: self.baseline.map(|Baseline::GaussianSplatting| {
-                let default = BaselineOptions::default();
-                BaselineOptions {
-                    amount: self.refine.unwrap_or(default.amount),
-                    sh_degree: self.sh_degree.unwrap_or(default.sh_degree),
-                    ..default
-                }
             }),
         }
     }
@@ -225,7 +243,7 @@ impl MethodArgs {
 
     /// Whether the scene's depth is read.
     pub(crate) fn wants_depth(&self) -> bool {
-        matches!(self.prior, Prior::Auto | Prior::Given) && self.baseline.is_none()
+        self.method_without_models().uses_given_depth()
     }
 }
 

@@ -145,7 +145,7 @@ pub(crate) fn run(
 /// Largest thread count of the systems; 0 (all cores) where one of them asks for all cores.
 fn most_threads(systems: &[System]) -> usize {
     let threads = |system: &System| match &system.maker {
-        Maker::Method(method) => method.settings.threads,
+        Maker::Method(method) => method.settings.threads(),
         Maker::Import(_) | Maker::Missing(_) => 0,
     };
     let all: Vec<usize> = systems.iter().map(threads).collect();
@@ -154,7 +154,7 @@ fn most_threads(systems: &[System]) -> usize {
 
 /// Runs `work` on the number of threads that the method sets; on `threads` where that pool has as many.
 fn on_threads<T>(method: &Method, threads: &Threads, work: impl FnOnce(&Threads) -> Result<T>) -> Result<T> {
-    match method.settings.threads {
+    match method.settings.threads() {
         // Where a method asks for all cores, `threads` has all of them.
         count if count == 0 || count == threads.count() => work(threads),
         count => work(&Threads::new(count)?),

@@ -13,7 +13,7 @@ use std::path::Path;
 use std::time::Instant;
 use vg::io::SceneOptions;
 use vg::metrics::{SurfaceErrors, ViewErrors};
-use vg::pipeline::{Options, PriorChoice, Verdict};
+use vg::pipeline::{Method, PriorChoice, Verdict};
 use vg::progress::Threads;
 use vg::render::{CpuRenderer, RenderOptions, Rendered, Renderer};
 use vg::scene::Cloud;
@@ -86,7 +86,7 @@ impl<'a> MethodInput<'a> {
 pub(crate) fn split(
     from: &MethodInput,
     split: &Split,
-    method: &Options,
+    method: &Method,
     judge: &References,
     threads: &Threads,
 ) -> Result<Measured> {
@@ -136,22 +136,21 @@ pub(crate) fn model(
 }
 
 /// Repeats the reconstruction and returns its milliseconds.
-pub(crate) fn time(from: &MethodInput, split: &Split, method: &Options, threads: &Threads) -> Result<f64> {
+pub(crate) fn time(from: &MethodInput, split: &Split, method: &Method, threads: &Threads) -> Result<f64> {
     let shown = inputs(from, split, method, threads)?;
     Ok(reconstruct::reconstruct(&shown, method, threads)?.report.total_ms)
 }
 
 /// The method's input views, with depth only where the method uses it.
-fn inputs(from: &MethodInput, split: &Split, method: &Options, threads: &Threads) -> Result<vg::Scene> {
-    let load_depth =
-        matches!(method.prior, PriorChoice::Auto | PriorChoice::Given) && method.baseline.is_none();
-    let options = SceneOptions { load_depth, ..from.options.clone() };
+fn inputs(from: &MethodInput, split: &Split, method: &Method, threads: &Threads) -> Result<vg::Scene> {
+    let options = SceneOptions { load_depth: method.uses_given_depth(), ..from.options.clone() };
     let mut shown = scene::open(from.scene, &split.input, &options, threads)?.scene;
     shown.cloud = match (from.cloud, from.cloud_points) {
         (Some(cloud), Some(count)) => Some(Cloud::new(sweep(cloud.points(), &shown.views, count))?),
         (cloud, _) => cloud.cloned(),
     };
-    if method.prior == PriorChoice::Auto && shown.views.iter().any(|v| v.depth.is_none()) {
+    let is_auto = method.vehicle().is_some_and(|options| options.prior == PriorChoice::Auto);
+    if is_auto && shown.views.iter().any(|v| v.depth.is_none()) {
         shown.views.iter_mut().for_each(|view| view.depth = None);
     }
     Ok(shown)

@@ -21,13 +21,13 @@ use serde::Serialize;
 use std::path::PathBuf;
 use system::{Maker, Method, SplitFilter, System};
 use vg::onnx::Model;
-use vg::pipeline::Options;
+use vg::pipeline;
 
 /// JSON document of one system.
 #[derive(Serialize)]
 struct Document<'a> {
     version: &'static str,
-    settings: &'a Options,
+    settings: &'a pipeline::Method,
     repeat: u32,
     splits: &'a [contest::InSplit],
     mean: Option<&'a Measured>,
@@ -75,7 +75,9 @@ pub(crate) fn inputs(vehicles: &VehiclesArgs, judge: &JudgeArgs, systems: &[Syst
         })
     };
     for method in methods() {
-        let models = [&method.settings.prior_model, &method.settings.head_model].into_iter().flatten();
+        let options = method.settings.vehicle();
+        let models =
+            options.into_iter().flat_map(|options| [&options.prior_model, &options.head_model]).flatten();
         inputs = inputs.files(models.map(Model::path));
     }
     for scene in vehicles::found(&vehicles.scenes)? {
@@ -98,7 +100,7 @@ fn run_single(args: &EvalArgs) -> Result {
         return Err(Failure { message: message.into(), code: USAGE });
     }
     let method = Method {
-        settings: args.method.options()?,
+        settings: args.method.method()?,
         depth_scale: args.depth.depth_scale,
         cloud: args.method.cloud.clone(),
         cloud_points: args.cloud_points.map(|n| n as usize),

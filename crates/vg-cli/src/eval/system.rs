@@ -8,7 +8,7 @@ use crate::scene;
 use clap::Parser;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use vg::pipeline::Options;
+use vg::pipeline;
 
 /// A system: the maker of its models, and the splits in which it is measured.
 pub(crate) struct System {
@@ -29,7 +29,7 @@ pub(crate) enum Maker {
 
 /// Settings and input of a reconstruction.
 pub(crate) struct Method {
-    pub(crate) settings: Options,
+    pub(crate) settings: pipeline::Method,
     /// Metres per unit of the depth files; overrides the scene's value.
     pub(crate) depth_scale: Option<f64>,
     /// Points measured on the vehicle, and the number to use of those that the input cameras see.
@@ -101,7 +101,7 @@ impl Method {
         })?;
         let settings = args
             .method
-            .options()
+            .method()
             .map_err(|failure| Failure { message: format!("{context}: {}", failure.message), ..failure })?;
         Ok(Self {
             settings,

@@ -23,7 +23,7 @@ pub(super) struct Part {
 /// The parts that this run has.
 pub(super) fn parts(report: &Report) -> Vec<Part> {
     let part = |heading, rows: Option<Rows>| Some(Part { heading, rows: rows? });
-    let ours = report.settings.baseline.is_none();
+    let ours = report.settings.vehicle().is_some();
     let vehicle = report.vehicle.map(|v| {
         let [length, width, height] =
             std::array::from_fn(|k| format!("{:.2} ± {:.2} m", v.size_m[k], v.uncertainty_m[k]));
@@ -226,7 +226,7 @@ pub(super) fn counts(views: &[View], report: &Report) -> Vec<(&'static str, usiz
     let symmetry = &report.symmetry;
     let divides = report.refinement.as_ref().is_some_and(|r| r.densified.is_some());
     // After densification, the original Gaussians can no longer be told from the new ones.
-    if report.settings.baseline.is_none() && !divides {
+    if report.settings.vehicle().is_some() && !divides {
         let placed = report.gaussians + symmetry.replaced - symmetry.cloned;
         rows.extend([
             ("Gaussians placed from pixels", placed),

@@ -40,7 +40,7 @@ pub(crate) fn run(args: &ReportArgs) -> Result {
     let threads = Threads::new(method.threads)?;
     let mut opened = scene::load(inputs, &threads)?.scene;
     opened.cloud = cloud_file.as_deref().map(cloud::read).transpose()?;
-    let made = reconstruct::reconstruct(&opened, &method.options()?, &threads)?;
+    let made = reconstruct::reconstruct(&opened, &method.method()?, &threads)?;
     reconstruct::note_warnings(&made.report);
     reconstruct::accept(&made.report, &args.strict)?;
 

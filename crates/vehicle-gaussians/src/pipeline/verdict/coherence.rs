@@ -1,7 +1,7 @@
-//! How far the silhouettes, and the depth with them, agree with one another.
+//! The agreement of the silhouettes with one another and with the depth.
 //!
-//! The ray of a mask's pixel hits the vehicle, so somewhere along it all other silhouettes have room for it, and so
-//! have their mirror images. Where only one silhouette has not, that one is to blame. A pixel's depth, lifted, lies
+//! The ray of a mask's pixel hits the vehicle, so some point on it lies inside all other silhouettes and their mirror
+//! images. Where a single silhouette excludes every such point, that one is to blame. A pixel's lifted depth lies
 //! inside all silhouettes.
 
 use crate::prior::Geometry;
@@ -13,32 +13,32 @@ use vg_geometry::{Intrinsics, MIRROR_Y};
 use vg_scene::mask::Label;
 use vg_scene::{Mask, View};
 
-/// Silhouettes that are asked, at most: those of more views are thinned evenly.
+/// The most silhouettes that rays are tested against; of more views, an even selection is used.
 const MOST_CARVERS: usize = 32;
 
-/// Pixels of all of them, at most: a silhouette takes four bytes a pixel.
+/// The most pixels of all of them: a silhouette takes four bytes per pixel.
 const MOST_CARVER_PIXELS: usize = 64_000_000;
 
-/// Rays per view, and of all views: a share of 1 % is told from none.
+/// The most rays per view, and of all views; enough to detect a share of 1 %.
 const MOST_RAYS_PER_VIEW: usize = 400;
 const MOST_RAYS: usize = 6400;
 
-/// Places along each ray, through a ball around the vehicle: 5 cm apart for a car.
+/// Points along each ray through a ball around the vehicle: 5 cm apart for a car.
 const STEPS: usize = 96;
 
-/// A place this far outside a silhouette is outside, pixels: edges are drawn to a pixel, and steps miss the best place.
+/// A point farther outside a silhouette is outside, pixels: edges are exact to a pixel, and steps miss the best point.
 const SLACK_PX: f64 = 3.0;
 
-/// Pixels with depth of one view that are needed before its share means something.
+/// Pixels with depth that a share of them needs to be meaningful.
 const LEAST_DEPTHS: usize = 20;
 
-/// What is found of all views.
+/// The agreement of all views.
 pub(super) struct Coherence {
     pub(super) views: Vec<ViewCoherence>,
     pub(super) depth_scale: Option<f64>,
 }
 
-/// What is found of one view; the fields are those of [`super::ViewEvidence`].
+/// The agreement of one view with the others; the fields are those of [`super::ViewEvidence`].
 pub(super) struct ViewCoherence {
     pub(super) coherent: Option<f64>,
     pub(super) coherent_mirrored: f64,
@@ -46,7 +46,7 @@ pub(super) struct ViewCoherence {
     pub(super) depth_inside: Option<f64>,
 }
 
-/// `None` where a view has no mask or nothing that is seen lies in a common place.
+/// Measures the agreement; `None` where a view has no mask or the views do not show a common place.
 pub(super) fn measure(views: &[View], geometry: Option<&Geometry>) -> Option<Coherence> {
     if views.iter().any(|view| view.mask.as_ref().is_none_or(|mask| mask.vehicle_pixels() == 0)) {
         return None;
@@ -63,7 +63,7 @@ pub(super) fn measure(views: &[View], geometry: Option<&Geometry>) -> Option<Coh
     let chosen: Vec<(usize, &View)> = views.iter().enumerate().step_by(every).collect();
     let carvers: Vec<Carver> = chosen.into_par_iter().map(carver).collect();
     let most = MOST_RAYS_PER_VIEW.min(MOST_RAYS / views.len()).max(16);
-    let asked: Vec<Vec<Ray>> = views
+    let rays: Vec<Vec<Ray>> = views
         .par_iter()
         .enumerate()
         .map(|(i, view)| {
@@ -73,9 +73,9 @@ pub(super) fn measure(views: &[View], geometry: Option<&Geometry>) -> Option<Coh
             thinned(view, most).map(along).collect()
         })
         .collect();
-    let all = || asked.iter().flatten();
+    let all = || rays.iter().flatten();
     let of_view = |i: usize| {
-        let own = &asked[i];
+        let own = &rays[i];
         let share = |n: usize, whole: usize| n as f64 / whole.max(1) as f64;
         let count = |test: &dyn Fn(&&Ray) -> bool| own.iter().filter(test).count();
         let carves = carvers.iter().position(|c| c.index == i);
@@ -87,7 +87,7 @@ pub(super) fn measure(views: &[View], geometry: Option<&Geometry>) -> Option<Coh
         ViewCoherence {
             coherent: has_others.then(|| share(count(&|ray| ray.meets), own.len())),
             coherent_mirrored: share(count(&|ray| ray.meets_mirrored), own.len()),
-            // Of two silhouettes that contradict each other, either may be wrong.
+            // With two silhouettes that contradict each other, either may be wrong.
             blamed: carves.filter(|_| carvers.len() > 2).map(|k| share(healed(k), others.len())),
             depth_inside: (has_others && depths >= LEAST_DEPTHS).then(|| share(inside, depths)),
         }
@@ -99,9 +99,9 @@ pub(super) fn measure(views: &[View], geometry: Option<&Geometry>) -> Option<Coh
     Some(Coherence { views: (0..views.len()).map(of_view).collect(), depth_scale })
 }
 
-/// Where the vehicle is, whether or not that is on the plane of symmetry: middle and radius, metres.
+/// Middle and radius of a ball around the vehicle, which need not be on the plane of symmetry, metres.
 fn ball(views: &[View]) -> Option<(DVec3, f64)> {
-    /// Views this nearly parallel do not tell how far away the vehicle is.
+    /// Views with less spread do not determine the distance of the vehicle.
     const LEAST_SPREAD: f64 = 0.01;
     let rays: Vec<(DVec3, DVec3)> = views
         .iter()
@@ -119,7 +119,7 @@ fn ball(views: &[View]) -> Option<(DVec3, f64)> {
     (middle.is_finite() && radius.is_finite() && radius > 0.0).then_some((middle, radius))
 }
 
-/// How far from `middle` the vehicle reaches by the size of a view's silhouette, metres, with half as much again.
+/// Radius of the vehicle around `middle` from the size of a view's silhouette, metres, times 1.5.
 fn reach(view: &View, middle: DVec3) -> f64 {
     const MARGIN: f64 = 0.75;
     let Some([u0, v0, u1, v1]) = view.mask.as_ref().and_then(Mask::bounds) else { return 0.0 };
@@ -128,16 +128,16 @@ fn reach(view: &View, middle: DVec3) -> f64 {
     MARGIN * angle * (middle - view.camera.center()).length()
 }
 
-/// Some of the mask's pixels, spread evenly.
+/// An even selection of the mask's pixels.
 fn thinned(view: &View, most: usize) -> impl Iterator<Item = usize> {
-    let labels = view.mask.as_ref().expect("looked at before").labels();
+    let labels = view.mask.as_ref().expect("checked above").labels();
     let pixels = move || (0..labels.len()).filter(|&pixel| labels[pixel] == Label::Vehicle);
     pixels().step_by(pixels().count().div_ceil(most).max(1))
 }
 
-/// A silhouette that others are held against.
+/// A silhouette that rays are tested against.
 struct Carver {
-    /// Of its view.
+    /// Index of its view.
     index: usize,
     silhouette: Silhouette,
     /// Metres.
@@ -145,7 +145,7 @@ struct Carver {
 }
 
 impl Carver {
-    fn denies(&self, p: Vec3) -> bool {
+    fn excludes(&self, p: Vec3) -> bool {
         self.silhouette.inside(p) < -self.slack
     }
 }
@@ -153,15 +153,15 @@ impl Carver {
 /// How one pixel's ray meets the silhouettes of the other views.
 struct Ray {
     view: usize,
-    /// Somewhere no other silhouette denies it.
+    /// Whether a point of it lies inside all other silhouettes.
     meets: bool,
-    /// Somewhere no other silhouette and no mirrored one does.
+    /// Whether a point of it lies inside all other silhouettes and all mirrored ones.
     meets_mirrored: bool,
-    /// Bit k: somewhere the k-th carver alone denies it.
+    /// Bit k: at some point of it the k-th carver is the only one that excludes the point.
     alone: u32,
     /// Whether the lifted pixel lies inside the other silhouettes; `None` without depth.
     depth_inside: Option<bool>,
-    /// The distance at which all silhouettes, mirrored ones too, first have room, by the pixel's own.
+    /// Depth of the first point inside all silhouettes, mirrored ones too, divided by the pixel's own depth.
     scale: Option<f64>,
 }
 
@@ -182,18 +182,18 @@ impl Ray {
         let around = (middle - center).dot(step) / step.length_squared();
         let reach = radius / step.length();
         let others = || carvers.iter().enumerate().filter(|(_, carver)| carver.index != index);
-        let denied = |p: Vec3| others().fold(0u32, |bits, (k, c)| bits | (u32::from(c.denies(p)) << k));
-        let denied_mirrored = |p: Vec3| carvers.iter().any(|carver| carver.denies(p * MIRROR_Y));
+        let excluding = |p: Vec3| others().fold(0u32, |bits, (k, c)| bits | (u32::from(c.excludes(p)) << k));
+        let is_excluded_mirrored = |p: Vec3| carvers.iter().any(|carver| carver.excludes(p * MIRROR_Y));
         let (mut meets, mut first, mut alone) = (false, None, 0);
         for k in 0..STEPS {
             let z = around + reach * (2.0 * (k as f32 + 0.5) / STEPS as f32 - 1.0);
             if z <= 0.0 {
                 continue;
             }
-            match denied(at(z)) {
+            match excluding(at(z)) {
                 0 => {
                     meets = true;
-                    if first.is_none() && !denied_mirrored(at(z)) {
+                    if first.is_none() && !is_excluded_mirrored(at(z)) {
                         first = Some(z);
                     }
                 }
@@ -207,7 +207,7 @@ impl Ray {
             meets,
             meets_mirrored: first.is_some(),
             alone,
-            depth_inside: depth.map(|z| denied(at(z)) == 0),
+            depth_inside: depth.map(|z| excluding(at(z)) == 0),
             scale: first.zip(depth).map(|(first, z)| f64::from(first) / f64::from(z)),
         }
     }

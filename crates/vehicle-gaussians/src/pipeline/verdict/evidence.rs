@@ -1,5 +1,5 @@
-//! The numbers that the verdict rests on: what the masks, the lenses, the silhouettes, the depth and the photographs
-//! say of one another.
+//! The numbers that the verdict is based on: how far masks, lenses, silhouettes, depth and photographs agree with one
+//! another.
 
 use super::coherence::{self, Coherence};
 use super::photographs;
@@ -10,54 +10,54 @@ use vg_scene::mask::Label;
 use vg_scene::{Mask, View};
 use vg_splat::Gaussians;
 
-/// The numbers that the verdict rests on. Those that compare views with one another are `None` where the check was
+/// The numbers that the verdict is based on. Those that compare views with one another are `None` where the check was
 /// switched off, where a view has no mask, and where there is no other view.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Evidence {
     /// Length, width and height between the lowest and the highest half per cent of the Gaussians' centres, metres.
     pub size_m: Option<[f64; 3]>,
-    /// Distance of the nearest camera from the middle of the Gaussians, metres.
+    /// Distance from the nearest camera to the middle of the Gaussians, metres.
     pub nearest_camera_m: Option<f64>,
-    /// Factor that would bring the depth to where the silhouettes say that the surface is, about; 1 for a depth that
-    /// agrees.
+    /// Approximate factor from the depth to the surface that the silhouettes bound; 1 for a depth that agrees.
     pub depth_scale: Option<f64>,
-    /// Each used view, in the order of `views_used`.
+    /// The numbers of each used view, in the order of `views_used`.
     pub views: Vec<ViewEvidence>,
 }
 
 /// The numbers of one view. Shares are 0 to 1.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ViewEvidence {
-    /// The view's name, or its place among those used where it has none.
+    /// The view's name; where it has none, its position among the used views.
     pub name: String,
     /// Pixels of the picture.
     pub pixels: f64,
-    /// Part of the picture that the mask calls vehicle.
+    /// Share of the picture that the mask labels as vehicle.
     pub mask_share: f64,
-    /// Part of the picture's border pixels that the mask calls vehicle.
+    /// Share of the picture's border pixels that the mask labels as vehicle.
     pub border_share: f64,
-    /// Part of the mask's pixels to which the lens model has no ray.
+    /// Share of the mask's pixels for which the lens model has no ray.
     pub without_ray: f64,
-    /// Part of the mask's pixels whose rays meet what the other views' silhouettes have in common.
+    /// Share of the mask's pixels whose rays meet the intersection of the other views' silhouettes.
     pub coherent: Option<f64>,
-    /// The same with the other half of the silhouettes, mirrored at the plane of symmetry.
+    /// Share of the mask's pixels whose rays meet the intersection of the other views' silhouettes and of all
+    /// silhouettes mirrored at the plane of symmetry.
     pub coherent_mirrored: Option<f64>,
-    /// Part of the other views' pixels that would meet if this view's silhouette were not there.
+    /// Share of the other views' pixels whose rays would meet without this view's silhouette.
     pub blamed: Option<f64>,
-    /// Part of the pixels with depth that are lifted to inside the other views' silhouettes.
+    /// Share of the pixels with depth whose lifted points lie inside the other views' silhouettes.
     pub depth_inside: Option<f64>,
-    /// Correlation of the brightness that this view and another one show of the same places: the best of the others.
+    /// Correlation of the brightness that this view and another one show of the same places; the highest over the
+    /// others.
     pub photographs: Option<f64>,
 }
 
-/// What there is to examine.
+/// The input of the examination.
 pub(in crate::pipeline) struct Examined<'a> {
-    /// The used views as the caller gave them, with their lenses.
+    /// The used views as the caller gave them, with lens distortion.
     pub(in crate::pipeline) given: &'a [&'a View],
-    /// The views that were used, undistorted, with the cameras and silhouettes that were used; y = 0 is the plane of
-    /// symmetry.
+    /// The undistorted views with the cameras and masks that were used; y = 0 is the plane of symmetry.
     pub(in crate::pipeline) used: &'a [View],
-    /// Depth of the used views, first in its list.
+    /// The depth of the used views; further views (mirrored ones) follow in its list.
     pub(in crate::pipeline) geometry: Option<&'a Geometry>,
 }
 
@@ -83,11 +83,11 @@ pub(in crate::pipeline) fn compare(examined: &Examined, context: &Context) -> Ev
     })
 }
 
-/// Looks at each view alone.
+/// Measures each view by itself.
 pub(in crate::pipeline) fn glance(examined: &Examined) -> Evidence {
     let all_used = examined.given.len() == examined.used.len();
-    let of_used = |(i, used): (usize, &View)| {
-        // Views that show nothing at the working resolution are given and not used.
+    let measured = |(i, used): (usize, &View)| {
+        // Views that show no vehicle at the working resolution are given and not used.
         let given = match all_used {
             true => examined.given.get(i),
             false => examined.given.iter().find(|view| view.name == used.name),
@@ -105,7 +105,7 @@ pub(in crate::pipeline) fn glance(examined: &Examined) -> Evidence {
             ..ViewEvidence::default()
         }
     };
-    Evidence { views: examined.used.iter().enumerate().map(of_used).collect(), ..Evidence::default() }
+    Evidence { views: examined.used.iter().enumerate().map(measured).collect(), ..Evidence::default() }
 }
 
 fn border_share(mask: &Mask) -> f64 {
@@ -116,31 +116,31 @@ fn border_share(mask: &Mask) -> f64 {
     vehicle as f64 / f64::from(2 * (w + h))
 }
 
-/// Of some of the mask's pixels.
+/// Share of the mask's pixels for which the lens model has no ray, from a sample.
 fn without_ray(view: &View) -> f64 {
-    /// Pixels that are asked, about: a share of 1 % is told from none.
-    const ASKED: usize = 400;
+    /// Approximate size of the sample, enough to detect a share of 1 %.
+    const SAMPLES: usize = 400;
     if view.camera.distortion.is_none() {
         return 0.0;
     }
     let labels = view.mask.as_ref().map(Mask::labels);
     let is_vehicle = |pixel: &usize| labels.is_none_or(|labels| labels[*pixel] == Label::Vehicle);
     let vehicle = || (0..view.image.pixels().len()).filter(is_vehicle);
-    let every = (vehicle().count() / ASKED).max(1);
-    let (mut asked, mut lost) = (0usize, 0usize);
+    let every = (vehicle().count() / SAMPLES).max(1);
+    let (mut sampled, mut lost) = (0usize, 0usize);
     let width = view.camera.width as usize;
     for pixel in vehicle().step_by(every) {
         let at = [(pixel % width) as f64 + 0.5, (pixel / width) as f64 + 0.5];
-        asked += 1;
+        sampled += 1;
         lost += usize::from(view.camera.ray(at).is_none());
     }
-    lost as f64 / asked.max(1) as f64
+    lost as f64 / sampled.max(1) as f64
 }
 
 impl Evidence {
-    /// Adds what the model tells, in the caller's frame.
+    /// Adds the size and the distance of the model, in the caller's frame.
     pub(in crate::pipeline) fn with_model(mut self, gaussians: &Gaussians, views: &[View]) -> Self {
-        /// Part of the centres that may stray to either side.
+        /// Share of the centres at either end that are ignored as strays.
         const STRAYS: f64 = 0.005;
         let n = gaussians.len();
         if n == 0 {

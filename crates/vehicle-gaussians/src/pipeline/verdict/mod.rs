@@ -1,6 +1,6 @@
-//! Whether a reconstruction is to be believed, and if not, why: evidence -> rules -> verdict with reasons.
+//! The verdict: whether a reconstruction can be trusted, and if not, why. Evidence -> rules -> verdict with reasons.
 //!
-//! Nothing here changes the model. Where the thresholds come from is in docs/VERDICT.md.
+//! The verdict does not change the model. The source of the thresholds is in docs/VERDICT.md.
 
 mod coherence;
 mod evidence;
@@ -14,37 +14,37 @@ pub(super) use rules::{Judged, judge};
 use serde::Serialize;
 use std::fmt;
 
-/// Whether a reconstruction is to be believed.
+/// Whether a reconstruction can be trusted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// Nothing looks wrong.
+    /// No rule found a mistake.
     #[default]
     Good,
-    /// Nothing looks wrong, but the check was switched off: views were not compared with one another.
+    /// No rule found a mistake, but the check was switched off: the views were not compared with one another.
     Unchecked,
-    /// Something looks wrong; the model may still be of use.
+    /// A rule found a mistake; the model may still be useful.
     Doubtful,
-    /// The input contradicts itself, or describes no road vehicle.
+    /// The input contradicts itself, or does not describe a road vehicle.
     Bad,
 }
 
-/// What a reason is about. The names in reports are those of the variants in kebab-case.
+/// The subject of a reason. Reports contain the names of the variants in kebab-case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum ReasonCode {
-    /// The vehicle is larger than any on the road.
+    /// The vehicle is larger than any road vehicle.
     TooLarge,
-    /// The vehicle is smaller than any on the road.
+    /// The vehicle is smaller than any road vehicle.
     TooSmall,
-    /// The vehicle is wider or taller than vehicles of its length are.
+    /// The vehicle is wider or taller than vehicles of its length.
     Proportions,
     /// The cameras are far away from the vehicle, or the vehicle from the origin.
     FarAway,
-    /// A mask looks as if vehicle and background had changed places.
+    /// Vehicle and background seem to be swapped in a mask.
     MaskInverted,
-    /// A lens model has no ray for a part of the vehicle's pixels.
+    /// A lens model has no ray for some of the vehicle's pixels.
     Lens,
     /// One view contradicts the others.
     ViewDisagrees,
@@ -52,23 +52,23 @@ pub enum ReasonCode {
     ViewsDisagree,
     /// The views agree with one another, but not with their mirror images.
     Symmetry,
-    /// The depth is of another unit than the poses.
+    /// The depth has another unit than the poses.
     DepthUnit,
     /// The depth lies outside the other views' silhouettes.
     DepthOutside,
     /// The photographs do not show the same things in the same places.
     Photographs,
-    /// The model's silhouette in a view is not its mask.
+    /// The model's silhouette in a view differs from the mask.
     Silhouette,
-    /// The model's picture in a view is not its photograph.
+    /// The model's picture in a view differs from the photograph.
     Picture,
-    /// A correction of the cameras was estimated and not believed.
+    /// A correction of the cameras was estimated and rejected.
     CalibrationRefused,
     /// The cameras were corrected by more than a few pixels.
     CamerasCorrected,
 }
 
-/// How much a reason weighs.
+/// The severity of a reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Severity {
@@ -78,18 +78,18 @@ pub enum Severity {
     Bad,
 }
 
-/// Why the verdict is not [`Verdict::Good`]. Displayed as one line.
+/// A reason why the verdict is not [`Verdict::Good`]. Displayed as one line.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Reason {
-    /// What it is about.
+    /// The subject.
     pub code: ReasonCode,
-    /// How much it weighs.
+    /// The severity.
     pub severity: Severity,
-    /// The view's name, where one is concerned.
+    /// The view's name, where the reason concerns a single one.
     pub view: Option<String>,
-    /// What was found.
+    /// The observation.
     pub found: String,
-    /// What is expected.
+    /// The expectation.
     pub expected: String,
     /// The likely cause.
     pub cause: String,
@@ -107,7 +107,7 @@ impl fmt::Display for Reason {
     }
 }
 
-/// The weight of the heaviest reason; without one, whether there was a check.
+/// The verdict of the most severe reason; without reasons, `Good` if there was a check.
 pub(super) fn verdict(reasons: &[Reason], was_checked: bool) -> Verdict {
     match reasons.iter().map(|reason| reason.severity).max() {
         None if was_checked => Verdict::Good,

@@ -1,4 +1,4 @@
-//! Whether the photographs show the same things in the same places: a picture that belongs to another camera does not.
+//! Whether the photographs show the same places in the same brightness: a photograph of another camera does not.
 
 use crate::prior::Geometry;
 use glam::Vec3;
@@ -6,17 +6,17 @@ use rayon::prelude::*;
 use vg_scene::View;
 use vg_scene::visibility::{SURFACE_M, Sight};
 
-/// Vehicle pixels of each view that are looked for in the others, at most.
+/// The most vehicle pixels of each view that are compared with the others.
 const MOST_PER_VIEW: usize = 1500;
 
-/// Places that two views share before their correlation means something.
+/// Shared places that a correlation needs to be meaningful.
 const LEAST_SHARED: usize = 60;
 
-/// Views farther apart in the list are not compared where there are many.
+/// Neighbours in the list that a view is compared with, where there are many views.
 const MOST_PARTNERS: usize = 16;
 
-/// For each view the correlation of its brightness with that of the view that agrees best, over the places that both
-/// show; `None` where no other view shows enough of the same places.
+/// The correlation of each view's brightness with that of the view that agrees best, over the places that both show;
+/// `None` where no other view shows enough of the same places.
 pub(super) fn agreement(views: &[View], geometry: &Geometry) -> Vec<Option<f64>> {
     let observers = geometry.observers(views);
     let brightness = |color: Vec3| f64::from(color.dot(Vec3::splat(1.0 / 3.0)));
@@ -51,7 +51,7 @@ fn is_vehicle(view: &View, pixel: usize) -> bool {
     view.mask.as_ref().is_none_or(|mask| mask.is_vehicle((pixel % width) as u32, (pixel / width) as u32))
 }
 
-/// Pearson's; 0 where either is constant.
+/// Pearson's correlation; 0 where either variable is constant.
 fn correlation(pairs: &[[f64; 2]]) -> f64 {
     let n = pairs.len() as f64;
     let mean = |k: usize| pairs.iter().map(|p| p[k]).sum::<f64>() / n;

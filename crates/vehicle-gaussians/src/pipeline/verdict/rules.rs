@@ -1,13 +1,14 @@
-//! From evidence to reasons. Thresholds are between what good scenes and known mistakes show: docs/VERDICT.md.
+//! From evidence to reasons. The thresholds lie between the values of good scenes and of known mistakes:
+//! docs/VERDICT.md.
 
 use super::{Evidence, Reason, ReasonCode, Severity, ViewEvidence};
 use crate::calibrate::{Calibration, Verdict as Corrected};
 use crate::pipeline::report::CheckedView;
 
-/// What is judged.
+/// The input of the rules.
 pub(in crate::pipeline) struct Judged<'a> {
     pub(in crate::pipeline) evidence: &'a Evidence,
-    /// The check, in the order of the evidence's views; empty where it was switched off.
+    /// The errors in the input views, in the order of the evidence's views; empty where the check was switched off.
     pub(in crate::pipeline) checked: &'a [CheckedView],
     pub(in crate::pipeline) calibration: Option<&'a Calibration>,
     /// Whether the depth was measured or predicted, not made of the silhouettes.
@@ -16,7 +17,7 @@ pub(in crate::pipeline) struct Judged<'a> {
     pub(in crate::pipeline) is_completed: bool,
 }
 
-/// Everything that looks wrong, the heaviest first.
+/// All reasons, the most severe first.
 pub(in crate::pipeline) fn judge(judged: &Judged) -> Vec<Reason> {
     let mut reasons: Vec<Reason> = [
         lenses(judged),
@@ -37,7 +38,7 @@ pub(in crate::pipeline) fn judge(judged: &Judged) -> Vec<Reason> {
     reasons
 }
 
-/// Two limits: beyond the first something is doubtful, beyond the second bad.
+/// Two limits: values beyond the first are doubtful, values beyond the second bad.
 #[derive(Clone, Copy)]
 struct Limits {
     doubtful: f64,
@@ -45,7 +46,7 @@ struct Limits {
 }
 
 impl Limits {
-    /// Of a number that is good where it is small.
+    /// The severity of a number that is good where it is small.
     fn above(self, value: f64) -> Option<Severity> {
         match value {
             v if v > self.bad => Some(Severity::Bad),
@@ -54,13 +55,13 @@ impl Limits {
         }
     }
 
-    /// Of a number that is good where it is large.
+    /// The severity of a number that is good where it is large.
     fn below(self, value: f64) -> Option<Severity> {
         Self { doubtful: -self.doubtful, bad: -self.bad }.above(-value)
     }
 }
 
-/// What holds for all reasons of one rule.
+/// The fields that all reasons of one rule share.
 struct Rule {
     code: ReasonCode,
     expected: String,
@@ -75,9 +76,9 @@ impl Rule {
         Reason { code, severity, view, found, expected, cause: cause.into(), remedy: remedy.into() }
     }
 
-    /// A reason for each view that something was found of; one for all where they are many.
+    /// A reason for each view with a finding; a single one where there are many.
     fn of_views(&self, found: Vec<(Severity, &str, String)>) -> Vec<Reason> {
-        /// More have the same cause.
+        /// The most views that are named; more have a common cause.
         const MOST_NAMED: usize = 2;
         let again = || Rule { expected: self.expected.clone(), ..*self };
         let worst = found.iter().map(|(severity, ..)| *severity).max();
@@ -100,7 +101,7 @@ fn percent(share: f64) -> String {
     format!("{:.1} %", 100.0 * share)
 }
 
-/// A lens model that has no ray for vehicle pixels has folded back, or is another lens's.
+/// A lens model without a ray for vehicle pixels folds back, or belongs to another lens.
 fn lenses(judged: &Judged) -> Vec<Reason> {
     const WITHOUT_RAY: Limits = Limits { doubtful: 0.01, bad: 0.2 };
     let lost = |view: &ViewEvidence| WITHOUT_RAY.above(view.without_ray);
@@ -118,10 +119,10 @@ fn lenses(judged: &Judged) -> Vec<Reason> {
     }))
 }
 
-/// A mask that is vehicle along the picture's border holds what is around the vehicle.
+/// A mask that is vehicle along the picture's border marks the background.
 fn masks(judged: &Judged) -> Vec<Reason> {
     const BORDER: Limits = Limits { doubtful: 0.5, bad: 0.9 };
-    /// A mask that is full says nothing, which is no mistake of its values.
+    /// A full mask holds no information, which is another mistake than swapped values.
     const FULL: f64 = 0.999;
     let rule = Rule {
         code: ReasonCode::MaskInverted,
@@ -140,7 +141,7 @@ fn masks(judged: &Judged) -> Vec<Reason> {
     }))
 }
 
-/// What is said of each view that something is wrong with.
+/// The findings of a test of each view.
 fn each<'a>(
     judged: &Judged<'a>,
     found: impl Fn(&ViewEvidence) -> Option<(Severity, String)>,
@@ -150,7 +151,7 @@ fn each<'a>(
     judged.evidence.views.iter().filter_map(of).collect()
 }
 
-/// The same with the check's errors, where the silhouette was not left out.
+/// The findings of a test of each view and its errors, for views whose silhouette was not left out.
 fn each_checked<'a>(
     judged: &Judged<'a>,
     found: impl Fn(&ViewEvidence, &CheckedView) -> Option<(Severity, String)>,
@@ -166,13 +167,13 @@ fn each_checked<'a>(
 
 /// Length, width and height against those of road vehicles.
 fn size(judged: &Judged) -> Vec<Reason> {
-    /// An articulated bus, a lorry with its mirrors, a double-decker; a tenth above, nothing is.
+    /// An articulated bus, a lorry with its mirrors, a double-decker; no vehicle is a tenth larger.
     const LARGE: [Limits; 3] = [
         Limits { doubtful: 19.0, bad: 21.0 },
         Limits { doubtful: 2.9, bad: 3.3 },
         Limits { doubtful: 4.5, bad: 5.0 },
     ];
-    /// Smaller cars than 2.3 m have been built (1.37 x 0.99 x 1.00 m), but are not to be met; low ones are 1.0 m high.
+    /// Cars shorter than 2.3 m have been built (1.37 x 0.99 x 1.00 m) but are rare; the lowest are 1.0 m high.
     const SMALL: [Limits; 3] = [
         Limits { doubtful: 2.2, bad: 1.3 },
         Limits { doubtful: 1.1, bad: 0.6 },
@@ -213,7 +214,7 @@ fn size(judged: &Judged) -> Vec<Reason> {
         };
         return vec![rule.reason(severity, None, found)];
     }
-    // Depth shows a part of a vehicle where the photographs do.
+    // With given depth the model is only as complete as the photographs.
     let longest = length.max(width).max(height);
     let small = match judged.has_depth {
         true => SMALL[0].below(longest),
@@ -239,14 +240,14 @@ fn size(judged: &Judged) -> Vec<Reason> {
     shape.map(|severity| rule.reason(severity, None, found)).into_iter().collect()
 }
 
-/// Nothing that photographs show of a vehicle is this far away, metres.
+/// Photographs of vehicles are taken from nearer than this, metres.
 const FAR_M: f64 = 1000.0;
 
 /// Given or predicted depth against the silhouettes.
 fn depth(judged: &Judged) -> Vec<Reason> {
     const TOO_LONG: Limits = Limits { doubtful: 1.15, bad: 1.4 };
     const INSIDE: Limits = Limits { doubtful: 0.97, bad: 0.8 };
-    /// Part of the depth that lies inside although its unit is another one: silhouettes bound it from two sides.
+    /// Share of the depth that can lie inside the silhouettes in spite of a wrong unit.
     const BY_CHANCE: f64 = 0.6;
     if !judged.has_depth {
         return Vec::new();
@@ -280,9 +281,9 @@ fn depth(judged: &Judged) -> Vec<Reason> {
     }))
 }
 
-/// By which factor units are mistaken for metres.
+/// The unit mistake that explains a factor of `scale` between the depth and the silhouettes.
 fn likely_unit(scale: f64) -> &'static str {
-    /// The silhouettes tell a factor about so well.
+    /// Accuracy of the factor.
     const ABOUT: f64 = 1.25;
     let near = |unit: f64| (scale / unit).max(unit / scale) < ABOUT;
     match () {
@@ -300,7 +301,8 @@ fn likely_unit(scale: f64) -> &'static str {
 /// The silhouettes against one another.
 fn views(judged: &Judged) -> Vec<Reason> {
     const COHERENT: Limits = Limits { doubtful: 0.99, bad: 0.88 };
-    /// One view is to blame if so much of what fails would meet without it, and half as much again as without any other.
+    /// One view is to blame if this share of the failing rays would meet without it, and this many times as many as
+    /// without any other.
     const EXPLAINED: f64 = 0.5;
     const CLEARLY: f64 = 1.5;
     let mut reasons = ignored(judged);
@@ -348,7 +350,7 @@ fn views(judged: &Judged) -> Vec<Reason> {
 
 /// Views whose silhouette the calibration left out.
 fn ignored(judged: &Judged) -> Vec<Reason> {
-    /// Of a mask that an occluder cut, what is left lies within the model.
+    /// The rest of a mask that an occluder cut lies within the model.
     const COVERED: f64 = 0.97;
     let views = judged.evidence.views.iter().enumerate().filter(|(i, _)| is_ignored(judged, *i));
     views
@@ -370,7 +372,7 @@ fn ignored(judged: &Judged) -> Vec<Reason> {
         .collect()
 }
 
-/// Whether the calibration left out the silhouette of the view in this place.
+/// Whether the calibration left out the silhouette of the `i`-th view.
 fn is_ignored(judged: &Judged, i: usize) -> bool {
     judged.calibration.and_then(|calibration| calibration.views.get(i)).is_some_and(|view| view.ignored)
 }
@@ -410,7 +412,7 @@ fn photographs(judged: &Judged) -> Vec<Reason> {
     }))
 }
 
-/// Intersection over union that sampling alone costs: a band of about a pixel along the outline.
+/// Loss of intersection over union from sampling alone: a band of about a pixel along the outline.
 fn band(view: &ViewEvidence, pixels: f64) -> f64 {
     4.0 / (view.mask_share * pixels).sqrt().max(1.0)
 }
@@ -449,7 +451,7 @@ fn pictures(judged: &Judged) -> Vec<Reason> {
     }))
 }
 
-/// What the calibration could not repair, or had to repair.
+/// Errors of the cameras that the calibration could not correct, or had to correct.
 fn corrections(judged: &Judged) -> Vec<Reason> {
     /// Edges that miss the hull by less are no reason to doubt a refusal, pixels.
     const EDGES_PX: Limits = Limits { doubtful: 0.5, bad: 5.0 };

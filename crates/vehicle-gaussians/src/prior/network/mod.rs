@@ -10,7 +10,7 @@ mod contract;
 
 pub use agreement::{PoseFit, ViewFit};
 
-use super::{DepthPrior, Geometry};
+use super::{DepthPrior, Estimate, Geometry, PriorReport};
 use agreement::{fit_poses, fit_views, median};
 use contract::{Contract, DepthKind};
 use glam::{DMat3, DVec3};
@@ -77,7 +77,7 @@ impl DepthPrior for NetworkPrior {
         "onnx"
     }
 
-    fn estimate(&self, views: &[View], context: &Context) -> Result<Geometry> {
+    fn estimate(&self, views: &[View], context: &Context) -> Result<Estimate> {
         if let Some(n) = self.contract.framing.views.filter(|n| *n != views.len()) {
             let allowed =
                 format!("{n}, the fixed number of views of the network {}", self.model.path().display());
@@ -132,7 +132,10 @@ impl DepthPrior for NetworkPrior {
             depth.depth().iter().enumerate().filter(|(i, z)| **z <= 0.0 && vehicle(*i)).count()
         };
         report.without_depth = views.iter().zip(&depths).map(none).sum();
-        Ok(Geometry { network: Some(report), ..Geometry::new(depths, None) })
+        Ok(Estimate {
+            geometry: Geometry::new(depths, None),
+            report: PriorReport { network: Some(report), ..PriorReport::default() },
+        })
     }
 }
 

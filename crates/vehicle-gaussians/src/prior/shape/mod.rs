@@ -19,7 +19,7 @@ use super::volume::{
     Field, KnownBox, Silhouette, fill_masks, find_box, fit_cloud, inside_both, inside_known, march,
     uncovered_places,
 };
-use super::{DepthPrior, Ends, Geometry, WorkingBox};
+use super::{DepthPrior, Ends, Estimate, Geometry, PriorReport, WorkingBox};
 use glam::{DVec3, IVec3, Vec3};
 use lattice::{HULL_CLAMP_M, Lattice, NODES, VIEW_NUMBERS, hull_on, view_numbers};
 use network::{Network, Planes};
@@ -68,7 +68,7 @@ impl DepthPrior for ShapePrior {
         "shape"
     }
 
-    fn estimate(&self, views: &[View], context: &Context) -> Result<Geometry> {
+    fn estimate(&self, views: &[View], context: &Context) -> Result<Estimate> {
         require_masks(views)?;
         let silhouettes: Vec<Silhouette> =
             context.parallel(|| views.par_iter().map(Silhouette::new).collect());
@@ -103,7 +103,10 @@ impl DepthPrior for ShapePrior {
         }
         let error = |p: Vec3| f64::from(shape.lattice.sample(&shape.error, p));
         let ends = context.parallel(|| Ends::of_field(&field, error));
-        Ok(Geometry { points, ends, photo, masks: Some(masks), ..Geometry::new(depths, Some(working_box)) })
+        Ok(Estimate {
+            geometry: Geometry { ends, ..Geometry::new(depths, Some(working_box)) },
+            report: PriorReport { points, photo, masks: Some(masks), network: None },
+        })
     }
 }
 

@@ -14,7 +14,7 @@ pub(super) use seen::Seen;
 
 use super::chance::Rng;
 use super::parameters::{Parameters, sigmoid};
-use super::tie::Clone as Tied;
+use crate::symmetry::MirrorClone;
 use glam::{Quat, Vec3};
 use serde::Serialize;
 
@@ -72,7 +72,7 @@ impl Growth {
     /// Applies the rules; `None` if no Gaussian would be left. `prunes_large` is false before the first opacity reset.
     pub(super) fn new(
         parameters: &Parameters,
-        clones: &[Tied],
+        clones: &[MirrorClone],
         seen: &Seen,
         rules: &Densify,
         extent_m: f32,
@@ -130,7 +130,7 @@ impl Growth {
 
 /// Cancels clones and splits with the smallest gradients until there are at most `most` Gaussians, counting tied
 /// clones. Returns whether any was cancelled. A clone and a split each add one Gaussian.
-fn hold_back(fates: &mut [Fate], clones: &[Tied], seen: &Seen, most: usize) -> bool {
+fn hold_back(fates: &mut [Fate], clones: &[MirrorClone], seen: &Seen, most: usize) -> bool {
     let mut cost = vec![1; fates.len()];
     clones.iter().for_each(|clone| cost[clone.of as usize] += 1);
     let there: usize = (0..fates.len()).filter(|&i| fates[i] != Fate::Prune).map(|i| cost[i]).sum();

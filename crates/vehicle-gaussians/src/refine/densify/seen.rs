@@ -7,7 +7,7 @@
 //! position if the Gaussian is small relative to its distance. The authors' code measures from -1 to 1 across the
 //! picture: times half its size.
 
-use super::super::tie::Clone as Tied;
+use crate::symmetry::MirrorClone;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use rayon::prelude::*;
 use vg_geometry::Camera;
@@ -54,7 +54,7 @@ impl Seen {
         gaussians: &Gaussians,
         gradients: &Gradients,
         camera: &Camera,
-        clones: &[Tied],
+        clones: &[MirrorClone],
     ) {
         let projection = Projection::new(camera);
         let all = (0..gaussians.len()).into_par_iter().with_min_len(CHUNK);
@@ -202,7 +202,7 @@ mod tests {
         both.append(&blob([0.1, -0.1, 0.0], 0.05));
         let gradients = Gradients { means: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], ..Gradients::default() };
         seen.reset(1);
-        seen.note(&both, &gradients, &camera(), &[Tied { of: 0, gain: [1.0; 3] }]);
+        seen.note(&both, &gradients, &camera(), &[MirrorClone { of: 0, gain: [1.0; 3] }]);
         assert_eq!(seen.times, [2]);
         assert!(seen.gradient(0) > 0.0 && seen.radius_px(0) > 3.0);
         seen.reset(2);

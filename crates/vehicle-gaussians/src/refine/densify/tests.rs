@@ -18,7 +18,12 @@ fn row(of: &[(f32, f32, f32)]) -> (Parameters, Seen) {
 }
 
 /// An extent of 1 m: sizes in metres are shares of it.
-fn growth(of: &(Parameters, Seen), clones: &[Tied], rules: Densify, prunes_large: bool) -> Option<Growth> {
+fn growth(
+    of: &(Parameters, Seen),
+    clones: &[MirrorClone],
+    rules: Densify,
+    prunes_large: bool,
+) -> Option<Growth> {
     Growth::new(&of.0, clones, &of.1, &rules, 1.0, prunes_large)
 }
 
@@ -96,7 +101,7 @@ fn transparent_ones_are_pruned_and_large_ones_after_the_first_reset() {
 #[test]
 fn at_the_limit_the_largest_gradients_grow_first() {
     let of = row(&[(0.005, 0.5, 3e-4), (0.02, 0.5, 5e-4), (0.005, 0.5, 4e-4), (0.005, 0.001, 1.0)]);
-    let of_most = |most: usize, clones: &[Tied]| {
+    let of_most = |most: usize, clones: &[MirrorClone]| {
         let found = growth(&of, clones, Densify { most, ..Densify::default() }, false).unwrap();
         (found.sources, found.done.full)
     };
@@ -105,7 +110,7 @@ fn at_the_limit_the_largest_gradients_grow_first() {
     assert_eq!(of_most(3, &[]), (vec![0, 1, 2], true));
     assert_eq!(of_most(1, &[]), (vec![0, 1, 2], true));
     // With a mirror image each of them is two.
-    let tied = [Tied { of: 1, gain: [1.0; 3] }];
+    let tied = [MirrorClone { of: 1, gain: [1.0; 3] }];
     assert_eq!(of_most(6, &tied), (vec![0, 2, 1, 1], true));
 }
 

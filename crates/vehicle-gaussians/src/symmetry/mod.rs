@@ -1,8 +1,18 @@
 //! Completing the vehicle across its symmetry plane y = 0 (paper sec. "Symmetry-Aware Gaussian Cloning").
 //!
-//! Gaussians that straddle the plane are cloned like all others, though the copy overlaps the original and the seam
-//! grows more opaque: they are nearly opaque already. On ten ray-traced vehicles 0.15 % of the Gaussians straddle
-//! it, and leaving their copies out changes the mean PSNR of the unseen side by less than 0.001 dB.
+//! [`complete`] clones Gaussians by a rule, `decision` finds out which mirrored places the views observed, and
+//! [`relight`] shows the clones in the light of their own side.
+//!
+//! Gaussians that straddle the plane are cloned like all others. The copy overlaps the original and makes the seam more
+//! opaque, but it is nearly opaque already: on ten ray-traced vehicles 0.15 % of the Gaussians straddle the plane, and
+//! leaving their copies out changes the mean PSNR of the unseen side by less than 0.001 dB.
+
+mod clone;
+mod decision;
+pub mod relight;
+
+pub(crate) use clone::MirrorClone;
+pub(crate) use decision::{BETTER, Completed};
 
 use serde::Serialize;
 use vg_geometry::Camera;
@@ -12,16 +22,16 @@ use vg_splat::Gaussians;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SymmetryMode {
-    /// Each place is shown by the better of its own observation and its mirror image's: Gaussians are cloned
-    /// where no view saw the mirrored place, and give way where it was seen better.
+    /// Each place is shown by the better of its own observation and that of its mirror image: a Gaussian is cloned
+    /// where no view saw the mirrored place, and removed where the mirrored place was seen better.
     #[default]
     Auto,
-    /// The paper's rule: the side with more Gaussians is the reference; the other side becomes its mirror
-    /// image, whatever was observed there.
+    /// The paper's rule: the side with more Gaussians is the reference, and its mirror image replaces the other side,
+    /// whatever was observed there.
     Always,
     /// No cloning.
     Never,
-    /// No cloning either: the views' mirror images were taken for further views, the paper's rival of cloning.
+    /// No cloning: the mirrored photographs are used as additional views, the alternative that the paper compares with.
     Flip,
 }
 
@@ -35,7 +45,7 @@ pub enum Side {
     Right,
 }
 
-/// What was done.
+/// Record of a completion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Completion {
     /// The rule.
@@ -44,8 +54,8 @@ pub struct Completion {
     pub reference_side: Side,
     /// Gaussians added as mirror images.
     pub cloned: usize,
-    /// Observed Gaussians given up for mirror images: the whole other side (`Always`), or those whose mirrored
-    /// place was seen better (`Auto`).
+    /// Observed Gaussians replaced by mirror images: the whole other side (`Always`), or those whose mirrored place
+    /// was seen better (`Auto`).
     pub replaced: usize,
     /// Gaussians not cloned because their mirrored place was observed too (`Auto`).
     pub not_needed: usize,
@@ -54,16 +64,16 @@ pub struct Completion {
 /// How well the mirrored place of a Gaussian was observed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MirroredPlace {
-    /// Not, or worse than the Gaussian itself.
+    /// Not observed, or worse than the Gaussian itself.
     Unseen,
-    /// About as well.
+    /// Observed about as well as the Gaussian itself.
     Seen,
-    /// Better.
+    /// Observed better than the Gaussian itself.
     SeenBetter,
 }
 
-/// Completes the vehicle: clones come last, and the last list tells of which Gaussian each is the mirror image.
-/// `mirrored_places` tells one verdict per Gaussian; asked in `Auto` only.
+/// Completes the vehicle. Clones come last; the returned list holds the index of the original of each.
+/// `mirrored_places` returns one verdict per Gaussian and is called in `Auto` only.
 pub fn complete(
     gaussians: Gaussians,
     mode: SymmetryMode,
@@ -103,7 +113,7 @@ pub fn complete(
     (complete, done, originals)
 }
 
-/// The denser side; equal counts choose the side with more cameras, then the left.
+/// The denser side; at equal counts the side with more cameras, then the left.
 fn reference_side(gaussians: &Gaussians, cameras: &[Camera]) -> Side {
     let balance =
         |ys: &mut dyn Iterator<Item = f64>| ys.map(|y| i64::from(y > 0.0) - i64::from(y < 0.0)).sum::<i64>();
@@ -112,7 +122,7 @@ fn reference_side(gaussians: &Gaussians, cameras: &[Camera]) -> Side {
     if gaussians < 0 || (gaussians == 0 && cameras < 0) { Side::Right } else { Side::Left }
 }
 
-/// A Gaussian on the plane belongs to the reference side.
+/// Whether a Gaussian at `y` belongs to `side`, the reference: one on the plane does.
 fn belongs(y: f32, side: Side) -> bool {
     match side {
         Side::Left => y >= 0.0,
@@ -163,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn auto_clones_what_was_not_seen_across_and_drops_what_was_seen_better_there() {
+    fn auto_clones_where_the_mirrored_place_was_unseen_and_removes_where_it_was_seen_better() {
         let places = [Unseen, Seen, SeenBetter, Seen];
         let (g, done, _) =
             complete(at(&[-1.0, -0.5, 0.9, 0.5]), SymmetryMode::Auto, &[], |_| places.to_vec());
@@ -172,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn never_changes_nothing() {
+    fn never_returns_the_gaussians_unchanged() {
         let g = at(&[-1.0, 0.2]);
         assert_eq!(complete(g.clone(), SymmetryMode::Never, &[], |_| vec![]).0, g);
     }

@@ -1,19 +1,19 @@
-//! Light is not symmetric: what the sun and the sky do to a mirror image, estimated from the side that was seen.
+//! The light of the unseen side, estimated from the seen one: vehicles are symmetric, their illumination is not.
 //!
-//! A clone shows the paint of the other side in the light of this one. With E(n) the light that falls on a surface
-//! of normal n, a clone whose normal went from n to M n has to be shown E(M n) / E(n) times as bright. Only E is
-//! needed, not the paint: most of a vehicle is one paint, and its front, rear, top and seen flank lie in the same
-//! light as the flank that nobody saw. Daylight has few parameters:
+//! A clone shows the paint of the other side in the light of this one. With E(n) the light that falls on a surface of
+//! normal n, a clone whose normal changed from n to M n must be E(M n) / E(n) times as bright. Only E is needed, not
+//! the paint: most of a vehicle is one paint, and its front, rear, top and seen flank are in the same light as the
+//! unseen flank. Daylight has few parameters:
 //!
 //! E(n) = 1 + u n_z + s max(0, n . l): an even sky and ground, brighter above by u, and a sun of strength s from
 //! direction l.
 //!
-//! What was seen is told to it as the paint's brightness in thirteen directions of the normal: the 90th percentile
-//! of the Gaussians that face each, for trim, tyres, glass and gaps are darker than paint. All suns of a grid are
-//! tried. Each has a likelihood by how well one paint explains the brightnesses, with a heavy tail, for a grille is
-//! no paint; a grey vehicle also shows the light's own colour, sunlight being yellower than skylight. The
-//! correction is the mean over all suns by their posterior: where several explain what was seen, one bright and one
-//! dark on the other side, they cancel and the clones stay as they are.
+//! The observation is the brightness of the paint in thirteen directions of the normal: the 90th percentile of the
+//! Gaussians that face each, because trim, tyres, glass and gaps are darker than paint. All suns of a grid are tried.
+//! The likelihood of each is how well one paint explains the brightnesses, with a heavy tail, because a grille is not
+//! paint. A grey vehicle also shows the colour of the light: sunlight is yellower than skylight. The correction is the
+//! mean over all suns, weighted by their posterior. Where several suns explain the observation, some bright and some
+//! dark on the other side, they cancel and the clones keep their colours.
 //!
 //! Measured in docs/COLOR.md.
 
@@ -28,43 +28,43 @@ use vg_splat::gaussians::{Gaussians, sh};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Relight {
-    /// As far as the light can be told from what was seen.
+    /// Yes, as far as the seen side determines the light.
     #[default]
     Auto,
-    /// Mirrored with the light of the side that was seen.
+    /// No: clones keep the light of the seen side.
     Never,
 }
 
-/// What was found, and what it does to clones.
+/// The estimated light, and how many clones it changed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Relighting {
-    /// Light on a surface facing left (+y) over light on one facing right (-y), as estimated: posterior mean of
+    /// Estimated ratio of the light on a surface facing left (+y) to that on one facing right (-y): posterior mean of
     /// the logarithm, bounded; linear light.
     pub left_over_right: f32,
-    /// Mean direction towards the sun, vehicle frame; shorter than 1 where it is not certain.
+    /// Mean direction towards the sun, vehicle frame; shorter than 1 where it is uncertain.
     pub sun: [f32; 3],
     /// Clones that were corrected.
     pub clones: usize,
 }
 
-/// Exponent of stored colours: linear light is about their power of this, so that a gain in light is a gain in the
-/// stored colour, and one that spherical harmonics can take.
+/// Exponent from stored colours to linear light, approximately. A gain in linear light is then a gain in the stored
+/// colour too, which spherical harmonics can represent.
 const DISPLAY_GAMMA: f32 = 2.2;
 
-/// Largest correction, as a logarithm in linear light: a factor of 2.2, the sunlit over the shaded flank of the
-/// vehicles it was measured on.
+/// Largest correction, natural logarithm of linear light: a factor of 2.2, the ratio of the sunlit to the shaded flank
+/// of the vehicles it was measured on.
 const MOST_LOG_GAIN: f32 = 0.8;
 
-/// Part of the posterior mean that is applied: the grid of suns is certain of itself, the model less so.
+/// Part of the posterior mean that is applied: the posterior on the grid does not contain the error of the model.
 const STRENGTH: f32 = 0.85;
 
-/// Gaussians that are looked at.
+/// Gaussians that are sampled, at most.
 const MOST_SAMPLES: usize = 1 << 15;
 
-/// Added to linear light before its logarithm is taken: black has no ratio.
+/// Added to linear light before the logarithm, so that black has one.
 const DARK: f32 = 0.01;
 
-/// Light of a scene, ready to correct clones.
+/// The light of a scene, as gains that correct clones.
 #[derive(Clone, Debug)]
 pub struct Light {
     gains: Vec<Vec3>, // [SIDE][SIDE], octahedral map of the clone's normal
@@ -73,14 +73,14 @@ pub struct Light {
 }
 
 impl Light {
-    /// From Gaussians that were observed; `None` where too few directions of the normal were.
+    /// Estimates the light from observed Gaussians; `None` where they face too few directions.
     pub fn estimate(seen: &Gaussians) -> Option<Self> {
         let facets = facets(seen);
         if facets.len() < 3 {
             return None;
         }
         let posterior = posterior(&facets);
-        // A row of the table has one sign of y; its mirror image has the inverse.
+        // All entries of a row have the same sign of y; the mirrored row has the inverse gains.
         let middle = SIDE / 2 * SIDE;
         let left: Vec<Vec3> =
             (middle..SIDE * SIDE).into_par_iter().map(|i| gain(&posterior, direction(i))).collect();
@@ -101,7 +101,7 @@ impl Light {
         upper.lerp(lower, dv)
     }
 
-    /// Shows `clones` in the light of their own side; also the factor that each one's colour took.
+    /// Shows `clones` in the light of their own side. Also returns the factor on the colour of each.
     pub fn apply(&self, gaussians: &mut Gaussians, clones: Range<usize>) -> (Relighting, Vec<[f32; 3]>) {
         let stride = gaussians.sh_stride();
         let (rotations, colors) = gaussians.rotations_and_colors_mut();
@@ -118,7 +118,7 @@ impl Light {
     }
 }
 
-/// Multiplies a colour; its mean over directions does not leave [0, 1] by that. The factor that was taken.
+/// Multiplies a colour by `gain`, or by less where its mean over directions would exceed 1. Returns the factor.
 fn scale_color(sh: &mut [f32], gain: [f32; 3]) -> [f32; 3] {
     let mean = sh::to_rgb([sh[0], sh[1], sh[2]]);
     let taken = std::array::from_fn(|channel| match mean[channel] {
@@ -139,23 +139,23 @@ fn normal([w, x, y, z]: [f32; 4]) -> Vec3 {
     Quat::from_xyzw(x, y, z, w) * Vec3::Z
 }
 
-// What was seen.
+// The observation.
 
-/// The paint as seen where it faces one direction.
+/// The observed paint where it faces one direction.
 #[derive(Clone, Copy, Debug)]
 struct Facet {
     normal: Vec3,
     /// Logarithm of linear light.
     brightness: f32,
-    /// ln(blue / red) of what is about as bright.
+    /// ln(blue / red) of the samples of about that brightness.
     blue_over_red: f32,
-    /// How far its colour is from grey.
+    /// Distance of its colour from grey.
     saturation: f32,
     /// 0 to 1, by the number of Gaussians.
     weight: f32,
 }
 
-/// Faces and edges of a cube, without what faces the ground.
+/// Normals of the faces and edges of a cube, without those that face the ground.
 const FACING: [[f32; 3]; 13] = [
     [1.0, 0.0, 0.0],
     [-1.0, 0.0, 0.0],
@@ -173,15 +173,15 @@ const FACING: [[f32; 3]; 13] = [
 ];
 
 fn facets(seen: &Gaussians) -> Vec<Facet> {
-    /// A normal belongs to the direction it is this near to, as a cosine.
+    /// Smallest cosine between a normal and the direction that it belongs to.
     const NEAR: f32 = 0.8;
-    /// Fewer tell nothing.
+    /// Samples that a direction needs.
     const FEWEST: usize = 16;
     /// Share of all Gaussians that makes half the weight.
     const HALF: f32 = 0.02;
-    /// Of the brightnesses of one direction, as a fraction.
+    /// Quantile of the brightnesses of one direction that is taken for the paint.
     const PAINT_QUANTILE: f32 = 0.9;
-    /// What is this near to the paint's brightness tells its colour.
+    /// Samples whose brightness differs from the paint's by less determine its colour, natural logarithm.
     const AS_BRIGHT: f32 = 0.3;
 
     let directions = FACING.map(|d| Vec3::from_array(d).normalize());
@@ -228,7 +228,7 @@ fn quantile(values: impl Iterator<Item = f32>, fraction: f32) -> Option<f32> {
     Some(*values.select_nth_unstable_by(rank, f32::total_cmp).1)
 }
 
-// What it says of the light.
+// The light that explains it.
 
 /// One light: E(n) = 1 + sky n_z + strength max(0, n . sun).
 #[derive(Clone, Copy, Debug)]
@@ -247,10 +247,10 @@ impl Day {
     }
 }
 
-/// ln(blue / red) of skylight less that of sunlight, about.
+/// ln(blue / red) of skylight minus that of sunlight, approximately.
 const SKY_BLUE: f32 = 0.45;
 
-/// All lights with their prior: suns of any azimuth, even over the sky; from none to a hard one.
+/// All lights with their prior weights: suns evenly distributed over the sky, from none to a hard one.
 fn days() -> Vec<(f32, Day)> {
     const ELEVATIONS: [f32; 7] = [15.0, 25.0, 35.0, 45.0, 55.0, 65.0, 75.0];
     const AZIMUTHS: u16 = 24;
@@ -271,9 +271,9 @@ fn days() -> Vec<(f32, Day)> {
     days
 }
 
-/// The lights that are worth counting, with probabilities that sum to one.
+/// The lights of noticeable probability, normalised to a sum of 1.
 fn posterior(facets: &[Facet]) -> Vec<(f32, Day)> {
-    /// Less than this of the best is nothing.
+    /// Lights below this share of the best one are left out.
     const LEAST: f32 = 1e-3;
     let days = days();
     let logs: Vec<f32> =
@@ -290,26 +290,26 @@ fn posterior(facets: &[Facet]) -> Vec<(f32, Day)> {
     kept
 }
 
-/// Student's t with three degrees of freedom on what one paint in this light leaves unexplained.
+/// Log-likelihood of `day`: Student's t with three degrees of freedom on the residuals of one paint in this light.
 fn log_likelihood(facets: &[Facet], day: &Day) -> f32 {
-    /// Spread of brightness that is not light, as a logarithm.
+    /// Spread of brightness from causes other than light, natural logarithm.
     const BRIGHTNESS: f32 = 0.25;
-    /// Spread of ln(blue / red) of grey paint, and what saturation adds to it.
+    /// Spread of ln(blue / red) of grey paint, and its growth with saturation.
     const TINT: f32 = 0.1;
     const TINT_OF_SATURATION: f32 = 0.3;
-    /// Colours further from grey than this tell nothing of the light's colour.
+    /// More saturated paint does not show the colour of the light.
     const MOST_SATURATION: f32 = 1.2;
     const TURNS: usize = 4;
 
     let heavy = |residual: f32, spread: f32| (residual / spread).powi(2) / 3.0;
-    let mut rest = [[0.0f32; 2]; FACING.len()]; // brightness and tint less the light's
+    let mut rest = [[0.0f32; 2]; FACING.len()]; // brightness and tint without the light's
     for (r, f) in rest.iter_mut().zip(facets) {
         let (light, sun) = day.light(f.normal);
         *r = [f.brightness - light.ln(), f.blue_over_red + SKY_BLUE * sun];
     }
     let seen = || facets.iter().zip(&rest);
 
-    // The paint: a mean that outliers have no part in.
+    // The paint: a robust mean.
     let mean = |paint: Option<f32>| {
         let (sum, weight) = seen().fold((0.0, 0.0), |(sum, total), (f, r)| {
             let w = f.weight / (1.0 + paint.map_or(0.0, |p| heavy(r[0] - p, BRIGHTNESS)));
@@ -349,12 +349,12 @@ fn gain(posterior: &[(f32, Day)], normal: Vec3) -> Vec3 {
     Vec3::new(log + tint, log, log - tint).map(|l| (l / DISPLAY_GAMMA).exp())
 }
 
-// The table of gains: directions unfolded onto a square, upper half within the inner diamond.
+// The table of gains: directions mapped to a square, the upper half within the inner diamond.
 
 /// Entries along one side.
 const SIDE: usize = 17;
 
-/// Place in the table of a direction.
+/// Coordinates of a direction in the table.
 fn octahedral(direction: Vec3) -> [f32; 2] {
     let d = direction / (direction.x.abs() + direction.y.abs() + direction.z.abs()).max(f32::MIN_POSITIVE);
     let [x, y] = match d.z {
@@ -425,7 +425,7 @@ mod tests {
         Day { sun: Vec3::new(e.cos() * a.cos(), e.cos() * a.sin(), e.sin()), strength, sky: 0.2 }
     }
 
-    /// Error in the stored colour of clones that face the other side: as mirrored, and corrected.
+    /// Error in the stored colour of clones that face the other side: mirrored only, and corrected.
     fn error(albedo: [f32; 3], day: &Day) -> (f32, f32) {
         let seen = painted(albedo, day);
         let light = Light::estimate(&seen).unwrap();
@@ -445,7 +445,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sun_on_either_side_is_told_from_the_seen_side_and_its_shade_recovered() {
+    fn the_shade_of_a_sun_on_either_side_is_recovered_from_the_seen_side() {
         for albedo in [GREY, [0.02; 3], [0.2, 0.03, 0.02], [0.02, 0.05, 0.2]] {
             for (azimuth, strength) in [(-60.0, 3.0), (-120.0, 1.5), (60.0, 3.0), (120.0, 3.0), (90.0, 1.5)] {
                 let (before, after) = error(albedo, &sun(azimuth, 40.0, strength));
@@ -455,7 +455,7 @@ mod tests {
     }
 
     #[test]
-    fn light_that_is_the_same_all_round_corrects_nothing() {
+    fn light_that_is_even_around_the_vehicle_corrects_nothing() {
         for sky in [0.0, 0.3] {
             let day = Day { sun: Vec3::Z, strength: 0.0, sky };
             let light = Light::estimate(&painted(GREY, &day)).unwrap();
@@ -467,7 +467,7 @@ mod tests {
     }
 
     #[test]
-    fn paint_of_any_brightness_and_colour_tells_the_same_side() {
+    fn paint_of_any_brightness_and_colour_determines_the_sunny_side() {
         for albedo in [[0.02; 3], [0.2; 3], [0.2, 0.03, 0.02], [0.02, 0.05, 0.2]] {
             let left = Light::estimate(&painted(albedo, &sun(75.0, 40.0, 2.0))).unwrap();
             let right = Light::estimate(&painted(albedo, &sun(-75.0, 40.0, 2.0))).unwrap();
@@ -527,7 +527,7 @@ mod tests {
     fn the_table_holds_every_direction() {
         for i in 0..SIDE * SIDE {
             let [u, v] = octahedral(direction(i));
-            // The rim holds the directions below twice; both hold the same gain.
+            // The rim holds the downward directions twice, with equal gains.
             let back = (v.round() as usize).min(SIDE - 1) * SIDE + (u.round() as usize).min(SIDE - 1);
             assert!(direction(back).dot(direction(i)) > 0.999, "{i} {back}");
         }
