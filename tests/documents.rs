@@ -104,3 +104,34 @@ fn every_link_between_pages_leads_somewhere() {
     }
     assert!(broken.is_empty(), "{broken:#?}");
 }
+
+/// Rows of the table below a heading of docs/ARCHITECTURE.md, as cells without their code marks.
+fn rows(heading: &str) -> Vec<Vec<String>> {
+    let page = fs::read_to_string(root().join("docs/ARCHITECTURE.md")).unwrap();
+    let chapter = page.split("\n## ").find(|chapter| chapter.starts_with(heading)).expect("the chapter");
+    let lines = chapter.lines().filter(|line| line.starts_with("| "));
+    let cells = |line: &str| line.split('|').map(|cell| cell.trim().replace('`', "")).collect();
+    lines.skip(2).map(cells).collect()
+}
+
+#[test]
+fn every_equation_of_the_paper_is_where_the_table_says() {
+    let mut numbers = BTreeSet::new();
+    for row in rows("Where the paper's equations are") {
+        let [_, equations, _, function, file, _] = &row[..] else { panic!("{row:?}") };
+        let text = fs::read_to_string(root().join(file)).unwrap();
+        let defines = ["fn ", "def "].iter().any(|word| text.contains(&format!("{word}{function}")));
+        assert!(defines, "{file} has no {function}");
+        for number in equations.split(", ") {
+            // "paper eq. 3", "paper eqs. 3, 4".
+            let cited = text.split("paper eq").skip(1).any(|rest| {
+                let list = rest.trim_start_matches(['s', '.', ' ']);
+                let list = list.split(|c: char| !(c.is_ascii_digit() || ", ".contains(c))).next().unwrap();
+                list.split(", ").any(|cited| cited.trim().trim_end_matches(',') == number)
+            });
+            assert!(cited, "{file} does not cite equation {number}");
+            numbers.insert(number.parse::<u32>().unwrap());
+        }
+    }
+    assert_eq!(numbers, (1..=13).collect());
+}

@@ -43,7 +43,7 @@ def rotation(raw):
 
 
 def lifted(depth, intrinsics, vehicle_from_camera):
-    """Vehicle-frame points [H][W][3] of planar depth [H][W] in metres (paper eq. `vehicle_point`)."""
+    """Vehicle-frame points [H][W][3] of planar depth [H][W] in metres (paper eqs. 3, 4)."""
     height, width = depth.shape
     u = torch.arange(width, dtype=depth.dtype, device=depth.device) + 0.5
     v = torch.arange(height, dtype=depth.dtype, device=depth.device) + 0.5

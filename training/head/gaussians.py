@@ -39,7 +39,7 @@ class Gaussians(NamedTuple):
         )
 
     def completed(self, input_sides):
-        """G_reference and its mirror image (paper eq. `mirror`). Reference is the side of y = 0 with more
+        """G_reference and its mirror image (paper eqs. 10, 12). Reference is the side of y = 0 with more
         Gaussians; if equal, with more input cameras (`input_sides`, +1 left, -1 right); then the left."""
         y = self.means[:, 1].detach()
         left, right = int((y > 0).sum()), int((y < 0).sum())

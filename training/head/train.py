@@ -145,7 +145,7 @@ def picture(gaussians, frame):
 
 
 def picture_loss(gaussians, targets, perceptual):
-    """MSE + 0.05 LPIPS, summed over the targets (paper eq. `loss`)."""
+    """MSE + 0.05 LPIPS, summed over the targets (paper eq. 13)."""
     loss = 0
     for frame in targets:
         found = picture(gaussians, frame)

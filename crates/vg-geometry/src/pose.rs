@@ -1,4 +1,4 @@
-//! Rigid transforms `to_from`: p_to = R p_from + t (paper eq. `vehicle_point`).
+//! Rigid transforms `to_from`: p_to = R p_from + t (paper eq. 4).
 
 use crate::error::{Error, Result};
 use glam::{DMat3, DQuat, DVec3, Vec3};

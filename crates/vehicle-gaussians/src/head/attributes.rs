@@ -1,8 +1,8 @@
 //! The paper's activations: from the 38 raw channels of one pixel to one Gaussian (method section 3).
 //!
-//! a = [o, dp, q, s, h]: opacity alpha = sigmoid(o + 3); centre mu = p_v + R_vc dp (eq. `offset`); rotation
-//! q / |q| in the vehicle frame; scale clip(activation(s), 1e-10, 3) metres (eq. `scale`); colour h with
-//! h_0 += RGB2SH(I).
+//! a = [o, dp, q, s, h]: opacity alpha = sigmoid(o + 3); centre mu = p_v + R_vc dp (paper eq. 7); rotation
+//! q / |q| in the vehicle frame; scale clip(activation(s), 1e-10, 3) metres (paper eq. 6); colour h
+//! with h_0 += RGB2SH(I) (paper eq. 8).
 
 use glam::{Mat3, Vec3};
 use vg_splat::gaussians::{buffer::normalize_quaternion, sh};

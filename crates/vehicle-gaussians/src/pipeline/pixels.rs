@@ -31,7 +31,7 @@ pub(super) fn pixels(run: &mut Run) -> Result<()> {
     Ok(())
 }
 
-/// Every vehicle pixel with depth, lifted (paper eqs. `metric_point_ray`, `vehicle_point`).
+/// Every vehicle pixel with depth, lifted (paper eq. 5).
 fn point_cloud(views: &[View], geometry: &Geometry) -> PointCloud {
     let mut cloud = PointCloud::default();
     for (view, depth) in views.iter().zip(&geometry.depths) {

@@ -132,7 +132,7 @@ pub fn reconstruct_on<'a>(
     reconstruct_with(&Parts::default(), threads, scene, options, progress)
 }
 
-/// Reconstructs the vehicle of `scene` with a depth prior or a Gaussian head of the caller's own. The report names them
+/// Reconstructs the vehicle of `scene` (paper eq. 1) with a depth prior or a Gaussian head of the caller's own. The report names them
 /// by their `name()`.
 ///
 /// ```
@@ -177,7 +177,7 @@ pub fn reconstruct_with<'a>(
 pub struct Reconstruction {
     /// The vehicle.
     pub gaussians: Gaussians,
-    /// The metric coloured point cloud (paper eq. for P), where the caller wants it: positions in metres and 8-bit
+    /// The metric coloured point cloud (paper eq. 5), where the caller wants it: positions in metres and 8-bit
     /// colours.
     pub points: Option<PointCloud>,
     /// How the model was made, and how good it is.

@@ -72,7 +72,7 @@ pub enum MirroredPlace {
     SeenBetter,
 }
 
-/// Completes the vehicle. Clones come last; the returned list holds the index of the original of each.
+/// Completes the vehicle (paper eq. 12). Clones come last; the returned list holds the index of the original of each.
 /// `mirrored_places` returns one verdict per Gaussian and is called in `Auto` only.
 pub fn complete(
     gaussians: Gaussians,

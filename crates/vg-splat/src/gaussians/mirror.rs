@@ -1,4 +1,4 @@
-//! Mirroring across the symmetry plane y = 0 (paper eq. `mirror`, with its rotation corrected).
+//! Mirroring across the symmetry plane y = 0 (paper eqs. 10, 11, with the rotation corrected).
 //!
 //! With M = diag(1, -1, 1): mu~ = M mu and Sigma~ = M Sigma M. The paper stores R~ = M R, which has determinant
 //! -1 and is no rotation; since S S^T is diagonal, M R M gives the same Sigma~ and is one: the quaternion

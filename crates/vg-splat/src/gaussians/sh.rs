@@ -22,7 +22,7 @@ pub const ODD_IN_Y: [bool; 16] = [
     true, true, true, false, false, false, false, // l = 3
 ];
 
-/// Coefficient of degree 0 of colour `rgb` in [0, 1], RGB2SH of the paper: 2 sqrt(pi) (rgb - 0.5).
+/// Coefficient of degree 0 of colour `rgb` in [0, 1], RGB2SH (paper eq. 9): 2 sqrt(pi) (rgb - 0.5).
 pub fn from_rgb(rgb: [f32; 3]) -> [f32; 3] {
     rgb.map(|c| (c - 0.5) / Y0)
 }

@@ -1,4 +1,4 @@
-//! Depth from a network in an ONNX file: MapAnything, or any other that keeps the contract (docs/ONNX.md).
+//! Depth from a network in an ONNX file (paper eq. 2): MapAnything, or any other that keeps the contract (docs/ONNX.md).
 //!
 //! The network's rays and cameras are only checked: a pixel's direction comes from the caller's intrinsics and its
 //! position from the caller's pose, so that pictures and model line up. The network contributes distance alone. The
@@ -260,7 +260,7 @@ impl NetworkPrior {
         Ok(())
     }
 
-    /// Planar depth in units of the network, 0 where its mask excludes the pixel; paper eq. `metric_point_ray` along
+    /// Planar depth in units of the network, 0 where its mask excludes the pixel; paper eq. 3 along
     /// the ray of the caller's intrinsics.
     fn planar(&self, prediction: &Prediction, view: usize, fit: &Fit, views: &[View]) -> Vec<f32> {
         let i = fit.intrinsics(&views[view].camera.intrinsics);
