@@ -176,7 +176,7 @@ pub(super) unsafe fn on_white(argument: &str, image: &vg_image) -> Result<Vec<[f
 /// The picture's format, one of these, and nothing in it that a later version may have a meaning for.
 fn format_of<T: Copy>(argument: &str, image: &vg_image, formats: &[(i32, &str, T)]) -> Result<T> {
     read::zero(&format!("{argument}.flags"), image.flags == 0)?;
-    read::choice(&format!("{argument}.format"), image.format, formats)
+    read::one_of(&format!("{argument}.format"), image.format, formats)
 }
 
 /// All bytes from the first to the last pixel, and the stride, after checking that they can be counted.

@@ -2,9 +2,8 @@
 
 use crate::arrays::{array, borrowed, floats, owned, shape_text, similarity, values, vector};
 use crate::camera::Camera;
-use crate::errors::{bad_type, bad_value, detached, from_library, pooled};
+use crate::errors::{bad_type, bad_value, choice, detached, from_library, pooled};
 use crate::parts;
-use crate::renderer::chosen;
 use crate::watched::watched;
 use crate::whole;
 use numpy::PyUntypedArrayMethods;
@@ -527,7 +526,7 @@ pub(crate) fn parse_background(object: &Bound<'_, PyAny>) -> PyResult<Background
 
 /// The graphics processor, where it is asked for.
 fn device(py: Python<'_>, backend: &str) -> PyResult<Option<Trainer>> {
-    match chosen(py, "backend", backend)? {
+    match choice(py, "backend", backend)? {
         Backend::Gpu => Ok(Some(detached(py, || trainer(Backend::Gpu))?.0)),
         Backend::Auto | Backend::Cpu => Ok(None),
     }
@@ -540,11 +539,7 @@ fn planes(
     depth_mode: &str,
 ) -> PyResult<RenderOptions> {
     let background = background.map_or(Ok(Background::Color([1.0; 3])), parse_background)?;
-    let depth_mode = match depth_mode {
-        "expected" => DepthMode::Expected,
-        "accumulated" => DepthMode::Accumulated,
-        other => return Err(bad_value(py, "depth_mode", &format!("{other:?}"), "expected, accumulated")),
-    };
+    let depth_mode = choice(py, "depth_mode", depth_mode)?;
     Ok(RenderOptions { background, depth_mode, ..RenderOptions::default() })
 }
 

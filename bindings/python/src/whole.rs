@@ -65,7 +65,8 @@ fn given<'py, T>(
     if object.is_none() { Ok(None) } else { parse(object).map(Some) }
 }
 
-fn whole<T: TryFrom<u64>>(object: &Bound<'_, PyAny>, argument: &str, allowed: &str) -> PyResult<T> {
+/// A whole number of any argument.
+pub(crate) fn whole<T: TryFrom<u64>>(object: &Bound<'_, PyAny>, argument: &str, allowed: &str) -> PyResult<T> {
     if let Some(number) = object.extract::<u64>().ok().and_then(|number| T::try_from(number).ok()) {
         return Ok(number);
     }

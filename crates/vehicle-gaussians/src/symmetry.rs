@@ -5,24 +5,23 @@
 //! it, and leaving their copies out changes the mean PSNR of the unseen side by less than 0.001 dB.
 
 use serde::Serialize;
-use vg_geometry::Camera;
+use vg_geometry::{Camera, choices};
 use vg_splat::Gaussians;
 
-/// When Gaussians are cloned.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum SymmetryMode {
-    /// Each place is shown by the better of its own observation and its mirror image's: Gaussians are cloned
-    /// where no view saw the mirrored place, and give way where it was seen better.
-    #[default]
-    Auto,
-    /// The paper's rule: the side with more Gaussians is the reference; the other side becomes its mirror
-    /// image, whatever was observed there.
-    Always,
-    /// No cloning.
-    Never,
-    /// No cloning either: the views' mirror images were taken for further views, the paper's rival of cloning.
-    Flip,
+choices! {
+    /// How the side that was not photographed is completed across the plane y = 0.
+    #[derive(Default)]
+    pub enum SymmetryMode as "symmetry" {
+        /// What no view observed is mirrored; what the other side shows at 1.03 times the resolution gives way.
+        #[default]
+        Auto = 0 "auto",
+        /// The side with more Gaussians replaces the other, whatever was observed there.
+        Always = 1 "always",
+        /// Nothing is mirrored.
+        Never = 2 "never",
+        /// The photographs are mirrored instead of the model, and taken for further views: slower, and rarely better.
+        Flip = 3 "flip",
+    }
 }
 
 /// A side of the plane y = 0.

@@ -10,10 +10,12 @@
 
 pub mod align;
 pub mod camera;
+pub mod choice;
 pub mod distortion;
 pub mod error;
 pub mod frame;
 pub mod nearest;
+pub mod options;
 mod pixels;
 mod placed;
 pub mod pose;
@@ -24,6 +26,7 @@ pub mod threads;
 pub mod unfolded;
 
 pub use align::Similarity;
+pub use choice::Choice;
 pub use camera::{Camera, CameraModel, Intrinsics, OpenCvModel};
 pub use distortion::Distortion;
 pub use error::{Error, Result};

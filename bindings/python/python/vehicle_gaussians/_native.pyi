@@ -1,4 +1,4 @@
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, SupportsIndex, final, overload
@@ -673,24 +673,12 @@ def reconstruct(
     cameras: Sequence[Camera],
     depths: Sequence[object] | None,
     *,
-    prior: str,
+    options: Mapping[str, object],
     prior_model: Model | None,
     head_model: Model | None,
-    calibrate: str,
-    symmetry: str,
-    relight: str,
-    photo: bool,
     cloud: object | None,
     vehicle_size: Size | None,
     vehicle_place: Placed | None,
-    sh_degree: int,
-    keep: Sequence[str],
-    check: bool,
-    points: bool,
-    budget: float | None,
-    resolution: float,
-    max_views: int | None,
-    max_gaussians: int | None,
     refine_iterations: int | None,
     refine_seconds: float | None,
     refine_hold_out: bool,

@@ -83,16 +83,17 @@ def reconstruct(
     cameras: one per image, posed in the vehicle's frame (x forward, y left, z up, metres; y = 0 is the plane of
     symmetry).
     depths: floats (height, width), metres along the optical axis, 0 for none.
-    prior: "given" takes the depths, "hull" the silhouettes, "shape" the silhouettes and what vehicles look like,
-    "onnx" the network prior_model; "auto" the depths if every used view has them, else "shape",
-    which bends to those that are there, with a warning.
+    prior: depth source: the scene's own depth ("given"); the visual hull ("hull"); the hull corrected by a shape model
+    of vehicles ("shape"); the network of prior_model ("onnx"); or ("auto") given if every used view has depth, else
+    shape, fitted to the depth of the views that have it.
     prior_model, head_model: networks that tell depth, and that make Gaussians of pixels.
-    calibrate: correct cameras and the plane of symmetry where the silhouettes contradict them ("auto"), or take them
-    as they are ("off").
-    symmetry: mirror what no view observed ("auto"), all of the denser side ("always"), nothing ("never"), or the
+    calibrate: correct the plane of symmetry and the cameras where the silhouettes contradict them ("auto"), or use them
+    as given ("off").
+    symmetry: mirror the unobserved parts ("auto"), all of the denser side ("always"), nothing ("never"), or the
     photographs instead of the model ("flip").
-    relight: show mirror images in the light of their own side ("auto"), or as they were seen ("never").
-    photo: whether prior "shape" moves its surface to where the photographs agree.
+    relight: relight mirror images for their own side, as far as the observed light allows ("auto"), or leave their
+    colours as observed ("never").
+    photo: correct the shape prior's surface by photo-consistency.
     cloud: points measured on the vehicle, floats (n, 3), metres, vehicle frame, all finite; some may be wrong or show
     something else. Priors "shape" and "hull" bend their surface to them.
     vehicle_size: length, width, height in metres, to a few centimetres, where known; the silhouettes tell where a box of
@@ -100,17 +101,19 @@ def reconstruct(
     vehicle_place: x, y, z of that box's centre, metres, and its turn about z, radians, in the frame of the cameras, where
     known to a few decimetres. Its middle plane, not y = 0, is then the plane of symmetry; the result stays in the frame of
     the cameras.
-    sh_degree: highest degree of the colour, 0 to 3.
-    keep: what may not be left out as not needed: "duplicate-views", "overlap", "silhouette-edge", "floaters",
+    sh_degree: highest degree of the spherical harmonics that hold the colour; 0 to 3.
+    keep: omissions that the plan must not make: "duplicate-views", "overlap", "silhouette-edge", "floaters",
     "sh-bands", or "all".
-    check: draw the model into its input views for the report.
-    points: return the point cloud as well.
-    budget: seconds the call may take, where that matters; what is left out is then chosen to fit.
-    resolution: the share of their width and height to which the views are resampled first, above 0, at most 1; a budget
-    may choose less.
-    max_views: use at most this many views, those that spread best around the vehicle; a budget may choose fewer.
-    max_gaussians: most Gaussians that the model may have by what the masks say of its size; where they allow for more,
-    the views are resampled to fewer pixels, and the report's left_out says so. None: any number.
+    check: draw the model into its input views and report the error there.
+    points: return the metric coloured point cloud as well.
+    budget: time limit of the reconstruction in seconds; steps that do not fit are left out; seconds above 0. None: as
+    long as it takes.
+    resolution: resample the views first to this fraction of their width and height; a budget may choose less; above 0,
+    at most 1.
+    max_views: use at most N views, chosen to spread best around the vehicle; a budget may choose fewer; at least 1.
+    None: all.
+    max_gaussians: largest number of Gaussians, estimated from the masks; where they would give more, the views are
+    resampled to fewer pixels, and the report says so; at least 1. None: any number.
     refine_iterations, refine_seconds: optimise the model against the photographs, by so many steps, or by as many as fit
     into about so many seconds; the report tells how many that were. Beside a budget, not within it.
     refine_hold_out: one of three or more views takes no part in that and tells when to stop.
@@ -132,24 +135,26 @@ def reconstruct(
         None if masks is None else listed(masks, "masks", 2),
         listed(cameras, "cameras"),
         None if depths is None else listed(depths, "depths", 2),
-        prior=prior,
+        options={
+            "prior": prior,
+            "calibrate": calibrate,
+            "symmetry": symmetry,
+            "relight": relight,
+            "sh_degree": sh_degree,
+            "keep": [keep] if isinstance(keep, str) else listed(keep, "keep"),
+            "check": check,
+            "photo": photo,
+            "budget": budget,
+            "resolution": resolution,
+            "max_views": max_views,
+            "max_gaussians": max_gaussians,
+            "points": points,
+        },
         prior_model=prior_model,
         head_model=head_model,
-        calibrate=calibrate,
-        symmetry=symmetry,
-        relight=relight,
-        photo=photo,
         cloud=cloud,
         vehicle_size=vehicle_size,
         vehicle_place=vehicle_place,
-        sh_degree=sh_degree,
-        keep=[keep] if isinstance(keep, str) else listed(keep, "keep"),
-        check=check,
-        points=points,
-        budget=budget,
-        resolution=resolution,
-        max_views=max_views,
-        max_gaussians=max_gaussians,
         refine_iterations=refine_iterations,
         refine_seconds=refine_seconds,
         refine_hold_out=refine_hold_out,

@@ -2,19 +2,21 @@
 
 use glam::DVec3;
 use vg_geometry::Similarity;
-use vg_geometry::{Error, Result};
+use vg_geometry::{Error, Result, choices};
 use vg_scene::View;
 
-/// How front and back are told apart.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Heading {
-    /// By shape; where that fits as well the other way round, it is an error, which names the view to look at.
-    #[default]
-    Auto,
-    /// The first view by name, of those not taken from abeam, was taken from ahead of the vehicle's middle.
-    Forward,
-    /// It was taken from behind the middle.
-    Backward,
+choices! {
+    /// How front and back are told apart.
+    #[derive(Default)]
+    pub enum Heading as "heading" {
+        /// By shape; where the other way round fits as well, it is an error that names the view to look at.
+        #[default]
+        Auto = 0 "auto",
+        /// The first view by name, of those not taken from abeam, was taken from ahead of the vehicle's middle.
+        Forward = 1 "forward",
+        /// It was taken from behind the middle.
+        Backward = 2 "backward",
+    }
 }
 
 /// Nearer to abeam than this, ahead and behind are hard to tell in a picture: sine of 17 degrees.

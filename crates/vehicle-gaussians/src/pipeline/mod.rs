@@ -21,7 +21,7 @@ pub mod verdict;
 pub use budget::{BudgetPlan, Chosen};
 pub use cap::{DEFAULT_MAX_GAUSSIANS, GAUSSIANS};
 pub use machine::Machine;
-pub use options::{Calibrate, Keep, Options, PriorChoice};
+pub use options::{Calibrate, Keep, KeepItem, Options, PriorChoice};
 pub use report::{CheckedView, InputError, LeftOut, Report, Stage};
 pub use run::{PointCloud, Reconstruction, reconstruct, reconstruct_on};
 pub use size::VehicleSize;

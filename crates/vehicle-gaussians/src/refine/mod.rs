@@ -31,24 +31,24 @@ use serde::Serialize;
 use std::collections::VecDeque;
 use std::time::Instant;
 use tie::Clone as Tied;
-use vg_geometry::Result;
 use vg_geometry::progress::Context;
+use vg_geometry::{Result, choices};
 use vg_scene::View;
 use vg_splat::Gaussians;
 use work::{Measures, Work};
 
-/// Why a refinement ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Stop {
-    /// All steps are done.
-    Done,
-    /// The view that took no part got no better any more.
-    HeldOut,
-    /// The error grew far beyond where it began: the steps are too large.
-    Diverged,
-    /// No view sees anything of the model: there is nothing to begin with.
-    Unseen,
+choices! {
+    /// Why a refinement ended.
+    pub enum Stop as "refine_stop" {
+        /// All steps are done.
+        Done = 0 "done",
+        /// The view that took no part got no better any more.
+        HeldOut = 1 "held_out",
+        /// The error grew far beyond where it began; the best of the states before is returned.
+        Diverged = 2 "diverged",
+        /// No view sees anything of the model: it is as it was.
+        Unseen = 3 "unseen",
+    }
 }
 
 /// What a refinement did.

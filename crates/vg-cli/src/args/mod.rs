@@ -4,6 +4,7 @@ mod align;
 mod eval;
 mod method;
 mod report;
+mod settings;
 mod values;
 
 pub(crate) use align::{AlignArgs, Mode};
@@ -13,7 +14,7 @@ pub(crate) use report::ReportArgs;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
-use values::{Names, backend, background, names, picture_size, positive, refinement};
+use values::{Names, background, choice, names, picture_size, positive, refinement};
 use vg::refine::Amount;
 use vg::render::{Backend, Background};
 
@@ -166,7 +167,7 @@ pub(crate) struct RefineArgs {
     pub(crate) densify: bool,
     /// Who draws and goes back: the processor, a graphics processor in a build that has one, or what is known to pay
     /// (auto: the processor)
-    #[arg(long, value_name = "auto|cpu|gpu", default_value = "auto", value_parser = backend)]
+    #[arg(long, default_value = "auto", value_parser = choice::<Backend>())]
     pub(crate) backend: Backend,
     /// Worker threads; 0 means one per core
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -205,7 +206,7 @@ pub(crate) struct RenderArgs {
     #[arg(long)]
     pub(crate) depth: bool,
     /// Who draws: the CPU, a graphics processor, or what is best of what this build and this machine have
-    #[arg(long, value_name = "auto|cpu|gpu", default_value = "auto", value_parser = backend)]
+    #[arg(long, default_value = "auto", value_parser = choice::<Backend>())]
     pub(crate) backend: Backend,
     /// Worker threads; 0 means one per core
     #[arg(long, value_name = "N", default_value_t = 0)]

@@ -20,16 +20,18 @@ use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use vg_geometry::threads::OfProcess;
-use vg_geometry::{Error, Result};
+use vg_geometry::{Error, Result, choices};
 
-/// Where a model runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Provider {
-    /// The processor.
-    #[default]
-    Cpu,
-    /// The first CUDA device, where the runtime was built for it.
-    Cuda,
+choices! {
+    /// Where a model runs.
+    #[derive(Default)]
+    pub enum Provider as "provider" {
+        /// The processor.
+        #[default]
+        Cpu = 0 "cpu",
+        /// The first CUDA device, where ONNX Runtime was built for it.
+        Cuda = 1 "cuda",
+    }
 }
 
 /// How a model is opened.

@@ -1,6 +1,6 @@
 //! What may differ between two renders of the same Gaussians; the defaults are INRIA's and gsplat's.
 
-use vg_geometry::{Error, Result};
+use vg_geometry::{Error, Result, choices};
 
 /// What is behind the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,13 +11,14 @@ pub enum Background {
     Transparent,
 }
 
-/// What a depth pixel means.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DepthMode {
-    /// Sum of T alpha z over alpha: metres, 0 where alpha is 0.
-    Expected,
-    /// Sum of T alpha z, not divided (what the gradients are taken of).
-    Accumulated,
+choices! {
+    /// What a depth pixel means.
+    pub enum DepthMode as "depth_mode" {
+        /// Expected planar depth along the optical axis in metres; 0 where alpha is 0.
+        Expected = 0 "expected",
+        /// The same times alpha: the plain sum over the Gaussians.
+        Accumulated = 1 "accumulated",
+    }
 }
 
 /// Render settings; `RenderOptions::default()` is what everything is measured with.

@@ -13,20 +13,23 @@ pub(super) use rules::{Judged, judge};
 
 use serde::Serialize;
 use std::fmt;
+use vg_geometry::choices;
 
-/// Whether a reconstruction is to be believed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// Nothing looks wrong.
-    #[default]
-    Good,
-    /// Nothing looks wrong, but the check was switched off: views were not compared with one another.
-    Unchecked,
-    /// Something looks wrong; the model may still be of use.
-    Doubtful,
-    /// The input contradicts itself, or describes no road vehicle.
-    Bad,
+choices! {
+    /// Whether a reconstruction is to be believed.
+    #[derive(Default, PartialOrd, Ord)]
+    pub enum Verdict as "verdict" {
+        /// Nothing looks wrong.
+        #[default]
+        Good = 0 "good",
+        /// Nothing looks wrong, but [`Options::check`](super::Options::check) was `false`: views were not compared with
+        /// one another.
+        Unchecked = 1 "unchecked",
+        /// Something looks wrong; the model may still be of use.
+        Doubtful = 2 "doubtful",
+        /// The input contradicts itself, or describes no road vehicle.
+        Bad = 3 "bad",
+    }
 }
 
 /// What a reason is about. The names in reports are those of the variants in kebab-case.
