@@ -17,11 +17,11 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
 use std::sync::{Arc, LazyLock};
 use vg::geometry::Turntable;
-use vg::io::ply;
+use vg::io::{ply, splats};
 use vg::progress::Watch;
 use vg::render::backend::{Trainer, trainer};
 use vg::render::{
-    Backend, Background, CpuRenderer, DepthMode, Differentiable, PictureGradient, RenderOptions, Rendered,
+    Backend, Background, CpuRenderer, Differentiable, PictureGradient, RenderOptions, Rendered,
     Renderer,
 };
 
@@ -100,7 +100,7 @@ impl Gaussians {
     #[staticmethod]
     #[pyo3(signature = (path))]
     fn load_ply(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let (inner, _) = pooled(py, 1, || ply::read(&path))?;
+        let (inner, _) = pooled(py, 1, || splats::read(&path))?;
         Ok(Self::of(inner))
     }
 
@@ -110,7 +110,7 @@ impl Gaussians {
     ///     >>> car.save_ply("copy.ply")
     #[pyo3(signature = (path))]
     fn save_ply(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        pooled(py, 1, || ply::write(&path, &self.inner))
+        pooled(py, 1, || splats::write(&path, &self.inner))
     }
 
     /// From the bytes of a PLY file in the layout of 3D Gaussian Splatting.

@@ -2,7 +2,7 @@
 
 use crate::arrays::owned;
 use crate::camera::Camera;
-use crate::errors::{bad_value, choice, detached, pooled};
+use crate::errors::{choice, detached, pooled};
 use crate::parts::stays_here;
 use crate::reconstruct::picture;
 use crate::whole;

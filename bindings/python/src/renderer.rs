@@ -1,7 +1,7 @@
 //! `Renderer`: Gaussians made ready to be drawn many times, by the CPU or a graphics processor.
 
 use crate::camera::Camera;
-use crate::errors::{bad_value, choice, detached};
+use crate::errors::{choice, detached};
 use crate::gaussians::{Gaussians, parse_background, picture};
 use crate::parts::stays_here;
 use crate::watched::watched;

@@ -43,16 +43,6 @@ pub(crate) fn iterations(object: &Bound<'_, PyAny>) -> PyResult<Option<u32>> {
     given(object, |object| whole(object, "iterations", "1 to 1000000"))
 }
 
-/// `max_gaussians`, or None.
-pub(crate) fn max_gaussians(object: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
-    given(object, |object| whole(object, "max_gaussians", "at least 1"))
-}
-
-/// `max_views`, or None.
-pub(crate) fn max_views(object: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
-    given(object, |object| whole(object, "max_views", "at least 1"))
-}
-
 /// `refine_iterations`, or None.
 pub(crate) fn refine_iterations(object: &Bound<'_, PyAny>) -> PyResult<Option<u32>> {
     given(object, |object| whole(object, "refine_iterations", "1 to 1000000"))

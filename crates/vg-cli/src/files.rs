@@ -5,10 +5,13 @@ use crate::job::{Failure, Outcome, Result, USAGE};
 use crate::shown;
 use std::io::{BufWriter, ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
+use vg::io::splats;
 
 /// What a file holds, which the ending of its name must not contradict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
+    /// A model, in any format of [`splats::FORMATS`].
+    Model,
     Ply,
     Json,
     Csv,
@@ -19,8 +22,12 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    fn name(self) -> &'static str {
-        match self {
+    fn name(self) -> String {
+        let name = match self {
+            Self::Model => {
+                let names: Vec<&str> = splats::FORMATS.iter().map(|format| format.name).collect();
+                return format!("a {} file", names.join(" or "));
+            }
             Self::Ply => "a PLY file",
             Self::Json => "JSON",
             Self::Csv => "CSV",
@@ -28,11 +35,13 @@ impl Kind {
             Self::Html => "HTML",
             Self::Svg => "SVG",
             Self::Png => "a PNG picture",
-        }
+        };
+        name.to_owned()
     }
 
-    fn endings(self) -> &'static [&'static str] {
-        match self {
+    fn endings(self) -> Vec<&'static str> {
+        let endings: &[&str] = match self {
+            Self::Model => return splats::FORMATS.iter().flat_map(|format| format.endings).copied().collect(),
             Self::Ply => &["ply"],
             Self::Json => &["json"],
             Self::Csv => &["csv"],
@@ -40,11 +49,12 @@ impl Kind {
             Self::Html => &["html", "htm"],
             Self::Svg => &["svg"],
             Self::Png => &["png"],
-        }
+        };
+        endings.to_vec()
     }
 
     fn is_text(self) -> bool {
-        !matches!(self, Self::Ply | Self::Png)
+        !matches!(self, Self::Model | Self::Ply | Self::Png)
     }
 
     /// A name without an ending says nothing; devices and pipes are called what they are called.
@@ -163,7 +173,7 @@ mod tests {
     #[test]
     fn a_name_that_says_another_format_is_refused_and_one_that_says_none_is_not() {
         for (kind, name) in [
-            (Kind::Ply, "car.spz"),
+            (Kind::Model, "car.spz"),
             (Kind::Ply, "car.ply.gz"),
             (Kind::Png, "plot.jpg"),
             (Kind::Json, "r.txt"),
@@ -173,7 +183,7 @@ mod tests {
             assert!(failure.code == USAGE && failure.message.contains("expected a name that ends in ."));
         }
         for (kind, name) in
-            [(Kind::Ply, "CAR.PLY"), (Kind::Ply, "car"), (Kind::Html, "a.b.htm"), (Kind::Csv, "-")]
+            [(Kind::Model, "CAR.PLY"), (Kind::Ply, "car"), (Kind::Html, "a.b.htm"), (Kind::Csv, "-")]
         {
             assert!(kind.check_name(Path::new(name)).is_ok(), "{name}");
         }

@@ -6,7 +6,8 @@ use crate::job::{Outcome, Result};
 use crate::shown;
 use std::fmt::Write;
 use vg::Gaussians;
-use vg::io::ply::{self, Content, OtherGaussians, PlyNotes};
+use vg::io::ply::{Content, OtherGaussians, PlyNotes};
+use vg::io::splats;
 use vg::render::options::ALPHA_THRESHOLD;
 
 /// Longest side that a vehicle may have, metres, as `--box` accepts it.
@@ -29,7 +30,7 @@ const FEW: usize = 100;
 
 /// Gaussians, Gaussians that are not drawn, or coloured points.
 pub(crate) fn run(args: &InfoArgs) -> Result {
-    Ok(Outcome::done(match ply::read_content(files::input(&args.file))? {
+    Ok(Outcome::done(match splats::read_content(files::input(&args.file))? {
         Content::Gaussians(gaussians, notes) => of_gaussians(&gaussians, &notes),
         Content::Others(others) => of_others(&others),
         Content::Points((positions, _)) => of_points(&positions),

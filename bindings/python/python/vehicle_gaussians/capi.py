@@ -1522,9 +1522,7 @@ def reconstruct(
     # Referred to by this call's arguments until it returns.
     options.prior_model = _lent_model(prior_model, "prior_model")
     options.head_model = _lent_model(head_model, "head_model")
-    if refine_iterations is not None:
-        # Of C, 0 is none.
-        options.refine_iterations = whole(refine_iterations, "refine_iterations", 1, _U32, "1 to 1000000")
+    options.refine_iterations = _whole_or_0(refine_iterations, "refine_iterations", 1, _U32, "1 to 1000000")
     options.refine_seconds = _real_or_0(refine_seconds, "refine_seconds", "above 0, at most 86400")
     options.refine_hold_out = refine_hold_out
     options.refine_backend = _choice(Backend, "refine_backend", refine_backend)
@@ -1692,6 +1690,11 @@ def _logger(
             raised.append(error)
 
     return on_log
+
+
+def _whole_or_0(number: int | None, argument: str, lowest: int, highest: int, allowed: str) -> int:
+    """A whole number for C, where 0 is none."""
+    return 0 if number is None else whole(number, argument, lowest, highest, allowed)
 
 
 def _real_or_0(number: float | None, argument: str, allowed: str) -> float:

@@ -122,8 +122,8 @@ options! {
         /// Where metric depth comes from.
         pub prior: PriorChoice = PriorChoice::Auto => {
             help: "Depth source: the scene's own depth (given); the visual hull (hull); the hull corrected by a shape \
-                   model of vehicles (shape); the network of --prior-model (onnx); or (auto) given if every used view has \
-                   depth, else shape, fitted to the depth of the views that have it",
+                   model of vehicles (shape); the network of --prior-model (onnx); or (auto) the scene's own depth if \
+                   every used view has it, else the shape, fitted to the depth of the views that have it, with a warning",
         },
         /// A geometry network for the `Onnx` prior, see [`crate::prior::network`].
         pub prior_model: Option<Model> = None,
@@ -191,7 +191,7 @@ options! {
         /// At most this many views are used, those that spread best around the vehicle; `None`: all. A `budget_s` may choose
         /// fewer.
         pub max_views: Option<usize> = None => {
-            help: "Use at most N views, chosen to spread best around the vehicle; a budget may choose fewer",
+            help: "Use at most this many views, chosen to spread best around the vehicle; a budget may choose fewer",
             range: Some(Range::closed(1.0, f64::MAX, "at least 1")),
             none: Some("all"),
         },

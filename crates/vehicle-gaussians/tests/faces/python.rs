@@ -130,7 +130,8 @@ fn documentation(field: &Field) -> String {
             help = help.replace(&format!("({})", variant.name), &format!("({})", quoted(variant.name)));
         }
     }
-    if let Some(range) = field.facts.range {
+    // Bounds that are more than what goes without saying.
+    if let Some(range) = field.facts.range.filter(|range| range.high < f64::MAX) {
         help += &format!("; {}", range.words);
     }
     help.push('.');
@@ -215,7 +216,7 @@ fn set(field: &Field) -> String {
         Kind::Set(_) => format!("_kept({name})"),
         Kind::Flag => name.to_owned(),
         Kind::Whole => format!("whole({name}, {name:?}, {}, {words:?})", bounds()),
-        Kind::MaybeWhole => format!("0 if {name} is None else whole({name}, {name:?}, {}, {words:?})", bounds()),
+        Kind::MaybeWhole => format!("_whole_or_0({name}, {name:?}, {}, {words:?})", bounds()),
         Kind::Real => format!("real({name}, {name:?})"),
         Kind::MaybeReal => format!("_real_or_0({name}, {name:?}, {words:?})"),
     };
