@@ -41,7 +41,9 @@ impl Kind {
 
     fn endings(self) -> Vec<&'static str> {
         let endings: &[&str] = match self {
-            Self::Model => return splats::FORMATS.iter().flat_map(|format| format.endings).copied().collect(),
+            Self::Model => {
+                return splats::FORMATS.iter().flat_map(|format| format.endings).copied().collect();
+            }
             Self::Ply => &["ply"],
             Self::Json => &["json"],
             Self::Csv => &["csv"],

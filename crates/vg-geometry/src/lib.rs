@@ -14,6 +14,7 @@ pub mod choice;
 pub mod distortion;
 pub mod error;
 pub mod frame;
+pub mod measures;
 pub mod nearest;
 pub mod options;
 mod pixels;
@@ -26,8 +27,8 @@ pub mod threads;
 pub mod unfolded;
 
 pub use align::Similarity;
-pub use choice::Choice;
 pub use camera::{Camera, CameraModel, Intrinsics, OpenCvModel};
+pub use choice::Choice;
 pub use distortion::Distortion;
 pub use error::{Error, Result};
 pub use pixels::PixelAndDepth;

@@ -197,27 +197,15 @@ setting!(bool, Kind::Flag, "true or false", Value::Flag, |value| match value {
     _ => None,
 });
 
-setting!(
-    u8,
-    Kind::Whole,
-    "0 to 255",
-    |number| Value::Whole(number.into()),
-    |value| match value {
-        Value::Whole(number) => u8::try_from(*number).ok(),
-        _ => None,
-    }
-);
+setting!(u8, Kind::Whole, "0 to 255", |number| Value::Whole(number.into()), |value| match value {
+    Value::Whole(number) => u8::try_from(*number).ok(),
+    _ => None,
+});
 
-setting!(
-    usize,
-    Kind::Whole,
-    "a whole number",
-    |number| Value::Whole(number as u64),
-    |value| match value {
-        Value::Whole(number) => usize::try_from(*number).ok(),
-        _ => None,
-    }
-);
+setting!(usize, Kind::Whole, "a whole number", |number| Value::Whole(number as u64), |value| match value {
+    Value::Whole(number) => usize::try_from(*number).ok(),
+    _ => None,
+});
 
 setting!(
     Option<usize>,

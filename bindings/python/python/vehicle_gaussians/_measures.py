@@ -24,7 +24,7 @@ class ViewErrors(NamedTuple):
     """The error of a model in one photograph; None where a measure does not exist."""
 
     psnr_db: float
-    """Peak signal-to-noise ratio over the full frame, dB."""
+    """Peak signal-to-noise ratio over the full frame, dB; infinite for equal pictures."""
     psnr_box_db: float | None
     """Peak signal-to-noise ratio inside the bounding box of the mask, dB; None where the mask is empty."""
     ssim: float | None
@@ -32,9 +32,10 @@ class ViewErrors(NamedTuple):
     lpips: float | None
     """None without a model that measures it, and for a picture smaller than 64x64."""
     silhouette_iou: float
-    """Intersection over union of the mask and the pixels that the model covers by half or more."""
+    """Intersection over union of the mask and the pixels that the model covers by half or more, 0 to 1."""
     depth_mae_m: float | None
-    """Mean absolute difference of depth, metres; None without depth."""
+    """Mean absolute difference of depth where the view has depth and the model covers the pixel by half or more,
+    metres; None where that is nowhere."""
     depth_p90_m: float | None
     """90th percentile of that difference, metres."""
 
@@ -50,14 +51,14 @@ class SurfaceErrors(NamedTuple):
     chamfer_m: float
     """Mean of the two."""
     precision: float
-    """Share of the model's surface that is nearer to the scan than the threshold."""
+    """Share of the model's surface that is nearer to the scan than f_score."""
     recall: float
-    """Share of the scan that is nearer to the model's surface than the threshold."""
+    """Share of the scan that is nearer to the model's surface than f_score."""
     f_score: float
     """Harmonic mean of the two."""
     length_error_percent: float
     """How much longer (x) the model is than the scan, percent; negative: shorter."""
     width_error_percent: float
-    """How much wider (y) it is, percent."""
+    """The same of the width (y)."""
     height_error_percent: float
-    """How much higher (z) it is, percent."""
+    """The same of the height (z)."""

@@ -645,13 +645,13 @@ def view_errors(
     depth: Floats | None,
     lpips: Model | None,
     threads: int,
-) -> tuple[float, float | None, float | None, float | None, float, float | None, float | None]: ...
+) -> dict[str, float | None]: ...
 def surface_errors(
     gaussians: Gaussians,
     points: Floats,
     f_score: float,
     threads: int,
-) -> list[float]: ...
+) -> dict[str, float | None]: ...
 def segment(
     model: Model,
     image: npt.NDArray[np.uint8],

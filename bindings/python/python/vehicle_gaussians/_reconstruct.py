@@ -84,8 +84,8 @@ def reconstruct(
     symmetry).
     depths: floats (height, width), metres along the optical axis, 0 for none.
     prior: depth source: the scene's own depth ("given"); the visual hull ("hull"); the hull corrected by a shape model
-    of vehicles ("shape"); the network of prior_model ("onnx"); or ("auto") given if every used view has depth, else
-    shape, fitted to the depth of the views that have it.
+    of vehicles ("shape"); the network of prior_model ("onnx"); or ("auto") the scene's own depth if every used view has
+    it, else the shape, fitted to the depth of the views that have it, with a warning.
     prior_model, head_model: networks that tell depth, and that make Gaussians of pixels.
     calibrate: correct the plane of symmetry and the cameras where the silhouettes contradict them ("auto"), or use them
     as given ("off").
@@ -106,14 +106,14 @@ def reconstruct(
     "sh-bands", or "all".
     check: draw the model into its input views and report the error there.
     points: return the metric coloured point cloud as well.
-    budget: time limit of the reconstruction in seconds; steps that do not fit are left out; seconds above 0. None: as
-    long as it takes.
+    budget: time limit of the reconstruction in seconds; steps that do not fit are left out. None: as long as it takes.
     resolution: resample the views first to this fraction of their width and height; a budget may choose less; above 0,
     at most 1.
-    max_views: use at most N views, chosen to spread best around the vehicle; a budget may choose fewer; at least 1.
+    max_views: use at most this many views, chosen to spread best around the vehicle; a budget may choose fewer. None:
+    all.
     None: all.
     max_gaussians: largest number of Gaussians, estimated from the masks; where they would give more, the views are
-    resampled to fewer pixels, and the report says so; at least 1. None: any number.
+    resampled to fewer pixels, and the report says so. None: any number.
     refine_iterations, refine_seconds: optimise the model against the photographs, by so many steps, or by as many as fit
     into about so many seconds; the report tells how many that were. Beside a budget, not within it.
     refine_hold_out: one of three or more views takes no part in that and tells when to stop.

@@ -1515,8 +1515,8 @@ def reconstruct(
     options.photo = photo
     options.budget_s = _real_or_0(budget, "budget", "seconds above 0")
     options.resolution = real(resolution, "resolution")
-    options.max_views = 0 if max_views is None else whole(max_views, "max_views", 1, sys.maxsize, "at least 1")
-    options.max_gaussians = 0 if max_gaussians is None else whole(max_gaussians, "max_gaussians", 1, sys.maxsize, "at least 1")
+    options.max_views = _whole_or_0(max_views, "max_views", 1, sys.maxsize, "at least 1")
+    options.max_gaussians = _whole_or_0(max_gaussians, "max_gaussians", 1, sys.maxsize, "at least 1")
     options.points = points
     # The others.
     # Referred to by this call's arguments until it returns.

@@ -2,6 +2,7 @@
 
 use crate::text::{Entry, Named, merged, named_line, paragraph, shouted, within, wrapped};
 use vg::geometry::choice::Enumeration;
+use vg::geometry::measures::Measure;
 use vg::geometry::options::{Face, Field, Kind, Value};
 
 /// The struct, its defaults, and its way into the library.
@@ -15,9 +16,10 @@ pub(crate) fn options(source: &str) -> String {
         merged(list, declared, Named::Last, &of(declaration), None)
     });
     let set = |line: &str| named_line(line, "            ");
-    let source = within(&source, "        let rust = Options::default();\n        Self {\n", "        }\n", |list| {
-        merged(list, set, Named::First, &of(initial), None)
-    });
+    let source =
+        within(&source, "        let rust = Options::default();\n        Self {\n", "        }\n", |list| {
+            merged(list, set, Named::First, &of(initial), None)
+        });
     within(&source, "        Ok(Options {\n", "            ..Options::default()\n", |list| {
         merged(list, set, Named::First, &of(conversion), None)
     })
@@ -92,15 +94,59 @@ fn conversion(field: &Field) -> String {
     format!("            {name}: {value},\n")
 }
 
+/// What C says of a measure.
+fn documentation(measure: &Measure) -> String {
+    match measure.name {
+        // Stands behind `psnr_db` there.
+        "psnr_box_db" => "The same inside the bounding box of the mask; `None` where the mask is empty.".into(),
+        _ => paragraph(measure.doc),
+    }
+}
+
+/// The structs of measures, what they begin with, and what fills them.
+pub(crate) fn measures(source: &str) -> String {
+    let mut source = source.to_owned();
+    for (name, name_in_c, measures) in crate::MEASURES {
+        let of = |text: fn(&Measure) -> String| -> Vec<Entry> {
+            measures.iter().map(|measure| Entry::new(measure.name, text(measure))).collect()
+        };
+        let declared = of(|measure| {
+            let doc = translated(&documentation(measure).replace("`None`", "NAN"));
+            format!("{}    pub {}: f64,\n", wrapped(&doc, "    /// ", "    /// "), measure.name)
+        });
+        source = within(&source, &format!("pub struct vg_{name_in_c} {{\n"), "}\n", |list| {
+            merged(list, |line| named_line(line, "    pub "), Named::Last, &declared, None)
+        });
+        let at = source.find(&format!("unsafe impl Versioned for vg_{name_in_c} ")).unwrap();
+        let set = |line: &str| named_line(line, "            ");
+        let initial = within(&source[at..], "        Self {\n", "        }\n", |list| {
+            merged(list, set, Named::First, &of(|m| format!("            {}: NONE,\n", m.name)), None)
+        });
+        source.replace_range(at.., &initial);
+        let at = source.find(&format!("impl From<&{name}> for vg_{name_in_c} ")).unwrap();
+        let filled = within(&source[at..], "        Self {\n", "            ..Self::initial()\n", |list| {
+            let value = |m: &Measure| match m.may_lack {
+                true => format!("            {0}: or_nan(errors.{0}),\n", m.name),
+                false => format!("            {0}: errors.{0},\n", m.name),
+            };
+            merged(list, set, Named::First, &of(value), None)
+        });
+        source.replace_range(at.., &filled);
+    }
+    source
+}
+
 /// The variants of every enumeration that a file has.
 pub(crate) fn enumerations(source: &str) -> String {
     let mut source = source.to_owned();
     for e in crate::enumerations() {
         let start = format!("pub enum vg_{} {{\n", e.name);
         if let Some(at) = source.find(&start) {
-            let entries: Vec<Entry> = by_number(&e).into_iter().map(|v| Entry::new(v.ident, variant(&v))).collect();
+            let entries: Vec<Entry> =
+                by_number(&e).into_iter().map(|v| Entry::new(v.ident, variant(&v))).collect();
             let name_of = |line: &str| named_line(line, "    ");
-            source = within(&source, &start, "}\n", |list| merged(list, name_of, Named::Last, &entries, None));
+            source =
+                within(&source, &start, "}\n", |list| merged(list, name_of, Named::Last, &entries, None));
             // The lines above: attributes, and above them the documentation.
             let attributes = source[..at].rfind("#[repr(i32)]").unwrap();
             let documented = source[..attributes].rfind("\n\n").unwrap() + 2;

@@ -13,7 +13,9 @@ mod text;
 
 use vg::geometry::Choice;
 use vg::geometry::choice::Enumeration;
+use vg::geometry::measures::Measure;
 use vg::geometry::options::{Face, Field};
+use vg::metrics::{SurfaceErrors, ViewErrors};
 use vg::pipeline::Options;
 use vg_testing::root;
 use vg_testing::tools::assert_golden;
@@ -42,6 +44,12 @@ fn options(face: Face) -> Vec<Field> {
     fields.filter(|field| !field.facts.apart.contains(&face)).collect()
 }
 
+/// The structs of measures: their names in Rust and Python, and in C without `vg_`.
+const MEASURES: [(&str, &str, &[Measure]); 2] = [
+    ("ViewErrors", "view_errors", ViewErrors::MEASURES),
+    ("SurfaceErrors", "surface_errors", SurfaceErrors::MEASURES),
+];
+
 #[track_caller]
 fn assert_in_step(path: &str, generate: fn(&str) -> String) {
     let path = root().join(path);
@@ -61,6 +69,16 @@ fn the_enumerations_of_c_are_the_librarys() {
     for file in ["align", "model", "options", "refine", "render", "report"] {
         assert_in_step(&format!("src/capi/{file}.rs"), c::enumerations);
     }
+}
+
+#[test]
+fn the_measures_of_c_are_the_librarys() {
+    assert_in_step("src/capi/metrics.rs", c::measures);
+}
+
+#[test]
+fn the_measures_of_python_are_the_librarys() {
+    assert_in_step("bindings/python/python/vehicle_gaussians/_measures.py", python::measures);
 }
 
 #[test]
@@ -95,7 +113,13 @@ fn names_and_numbers_are_each_of_one_variant() {
     for e in enumerations() {
         for (i, a) in e.variants.iter().enumerate() {
             for b in &e.variants[..i] {
-                assert!(a.name != b.name && a.number != b.number, "{}: {} and {}", e.type_name, a.ident, b.ident);
+                assert!(
+                    a.name != b.name && a.number != b.number,
+                    "{}: {} and {}",
+                    e.type_name,
+                    a.ident,
+                    b.ident
+                );
             }
         }
     }

@@ -36,7 +36,11 @@ pub(crate) fn types(source: &str) -> String {
             }
             None => {
                 let e = crate::enumerations().into_iter().find(|e| camel(e.name) == alias.name).unwrap();
-                source.replacen("\n\n#: Floats", &format!("\n#: {}\n{}\n\n#: Floats", paragraph(e.doc), alias.text), 1)
+                source.replacen(
+                    "\n\n#: Floats",
+                    &format!("\n#: {}\n{}\n\n#: Floats", paragraph(e.doc), alias.text),
+                    1,
+                )
             }
         };
     }
@@ -221,4 +225,30 @@ fn set(field: &Field) -> String {
         Kind::MaybeReal => format!("_real_or_0({name}, {name:?}, {words:?})"),
     };
     format!("    options.{} = {value}\n", field.name)
+}
+
+/// `_measures.py`: the tuples of measures.
+pub(crate) fn measures(source: &str) -> String {
+    let mut source = source.to_owned();
+    for (name, _, measures) in crate::MEASURES {
+        let fields: Vec<Entry> = measures
+            .iter()
+            .map(|measure| {
+                let kind = if measure.may_lack { "float | None" } else { "float" };
+                let doc = paragraph(measure.doc)
+                    .replace("options.", "")
+                    .replace("f_score_m", "f_score")
+                    .replace('`', "");
+                let doc = wrapped(&format!("{doc}\"\"\""), "    \"\"\"", "    ");
+                Entry::new(measure.name, format!("    {}: {kind}\n{doc}", measure.name))
+            })
+            .collect();
+        let at = source.find(&format!("class {name}(NamedTuple):\n")).unwrap();
+        let start = source[at..].find("\"\"\"\n\n").unwrap() + at + 5;
+        let end = source[start..].find("\n\n").map_or(source.len(), |n| start + n + 1);
+        let changed =
+            merged(&source[start..end], |line| named_line(line, "    "), Named::First, &fields, None);
+        source.replace_range(start..end, &changed);
+    }
+    source
 }

@@ -50,7 +50,8 @@ pub(crate) fn merged(
             (None, _) => pending.push_str(line),
         }
     }
-    let (head, tail) = if named == Named::First { (pending, String::new()) } else { (String::new(), pending) };
+    let (head, tail) =
+        if named == Named::First { (pending, String::new()) } else { (String::new(), pending) };
     for entry in &mut entries {
         if let Some(found) = wanted.iter().find(|w| w.name == entry.name)
             && words_differ(&entry.text, &found.text)

@@ -131,7 +131,11 @@ impl MethodArgs {
                 let default = BaselineOptions::default();
                 BaselineOptions {
                     amount: self.refine.unwrap_or(default.amount),
-                    sh_degree: if table.is_given("sh_degree") { table.options.sh_degree } else { default.sh_degree },
+                    sh_degree: if table.is_given("sh_degree") {
+                        table.options.sh_degree
+                    } else {
+                        default.sh_degree
+                    },
                     ..default
                 }
             }),
@@ -146,7 +150,8 @@ impl MethodArgs {
 
     /// Whether depth of the scene is read.
     pub(crate) fn wants_depth(&self) -> bool {
-        matches!(self.settings.options.prior, PriorChoice::Auto | PriorChoice::Given) && self.baseline.is_none()
+        matches!(self.settings.options.prior, PriorChoice::Auto | PriorChoice::Given)
+            && self.baseline.is_none()
     }
 }
 

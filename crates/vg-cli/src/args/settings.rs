@@ -101,7 +101,9 @@ impl Row {
     /// What the command line says; `None` where it says nothing and there is no default.
     fn value(&self, matches: &ArgMatches) -> Option<Value> {
         match self.field.kind {
-            Kind::Flag => Some(Value::Flag(matches.get_flag(&self.id) ^ (self.field.default == Value::Flag(true)))),
+            Kind::Flag => {
+                Some(Value::Flag(matches.get_flag(&self.id) ^ (self.field.default == Value::Flag(true))))
+            }
             Kind::Set(_) => {
                 let chosen: Vec<String> = matches.get_many(&self.id)?.cloned().collect();
                 let every = || self.names().into_iter().map(str::to_owned).collect();

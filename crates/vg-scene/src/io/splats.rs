@@ -45,7 +45,9 @@ pub fn read_content(path: &Path) -> Result<Content> {
     let format = recognized(&mut input, path)?;
     match format.name == ply::FORMAT.name {
         true => ply::content(input, length, path),
-        false => (format.read)(&mut input, length, path).map(|(model, notes)| Content::Gaussians(model, notes)),
+        false => {
+            (format.read)(&mut input, length, path).map(|(model, notes)| Content::Gaussians(model, notes))
+        }
     }
 }
 

@@ -58,11 +58,7 @@ pub(in crate::io) fn content(input: impl BufRead, length: Option<u64>, path: &Pa
     }
 }
 
-fn bounds(
-    input: impl BufRead,
-    header: &Header,
-    path: &Path,
-) -> Result<Option<([f32; 3], [f32; 3])>> {
+fn bounds(input: impl BufRead, header: &Header, path: &Path) -> Result<Option<([f32; 3], [f32; 3])>> {
     let [Some(x), Some(y), Some(z)] = ["x", "y", "z"].map(|name| header.find(name)) else { return Ok(None) };
     let mut bounds: Option<([f32; 3], [f32; 3])> = None;
     rows::for_each(input, header, path, |_, row| {
