@@ -13,6 +13,7 @@ use std::sync::OnceLock;
 use vg::Error;
 use vg::calibrate::Verdict;
 use vg::geometry::camera::CameraModel;
+use vg::geometry::options::{self, Face, Field, Kind};
 use vg::io::{SceneOptions, open_scene};
 use vg::onnx::ModelOptions;
 use vg::pipeline::{self, InputError, Options, PriorChoice, Reason, ReasonCode, Report, Severity};
@@ -73,13 +74,7 @@ fn each_option_of_a_reconstruction_sets_its_namesake() {
         (options.vehicle_size, options.has_vehicle_place) = ([4.5, 1.75, 1.5], 1);
         options
     }
-    let effects: [Set<vg_options, Options>; 21] = [
-        ("prior", |o| o.prior = vg_prior::Hull as i32, |r| r.prior == PriorChoice::Hull),
-        ("symmetry", |o| o.symmetry = vg_symmetry::Never as i32, |r| format!("{:?}", r.symmetry) == "Never"),
-        ("sh_degree", |o| o.sh_degree = 1, |r| r.sh_degree == 1),
-        ("keep", |o| o.keep = vg_keep::Floaters as u32, |r| r.keep.floaters),
-        ("check", |o| o.check = 0, |r| !r.check),
-        ("points", |o| o.points = 1, |r| r.points),
+    let effects: [Set<vg_options, Options>; 8] = [
         ("vehicle_size", |o| o.vehicle_size = [4.5, 1.75, 1.5], |r| r.vehicle_size == Some([4.5, 1.75, 1.5])),
         (
             "vehicle_center",
@@ -88,13 +83,6 @@ fn each_option_of_a_reconstruction_sets_its_namesake() {
         ),
         ("vehicle_yaw", |o| place(o).vehicle_yaw = 0.25, |r| r.vehicle_place.is_some_and(|p| p.yaw == 0.25)),
         ("has_vehicle_place", |o| place(o).vehicle_flags = 0, |r| r.vehicle_place.is_some()),
-        ("calibrate", |o| o.calibrate = vg_calibrate::Off as i32, |r| format!("{:?}", r.calibrate) == "Off"),
-        ("relight", |o| o.relight = vg_relight::Never as i32, |r| format!("{:?}", r.relight) == "Never"),
-        ("photo", |o| o.photo = 0, |r| !r.photo),
-        ("budget_s", |o| o.budget_s = 2.5, |r| r.budget_s == Some(2.5)),
-        ("resolution", |o| o.resolution = 0.5, |r| r.resolution == 0.5),
-        ("max_gaussians", |o| o.max_gaussians = 7, |r| r.max_gaussians == Some(7)),
-        ("max_views", |o| o.max_views = 3, |r| r.max_views == Some(3)),
         (
             "refine_seconds",
             |o| o.refine_seconds = 1.5,
@@ -116,7 +104,7 @@ fn each_option_of_a_reconstruction_sets_its_namesake() {
             |r| format!("{:?}", refinement(r).backend) == "Cpu",
         ),
     ];
-    // `cloud` is below; callbacks are called by the client of each release, models by the tests of networks.
+    // Options of the table are in the next test; `cloud` is below; callbacks are called by the client of each release, models by the tests of networks.
     let elsewhere = [
         "struct_size",
         "context",
@@ -133,6 +121,8 @@ fn each_option_of_a_reconstruction_sets_its_namesake() {
         "vehicle_flags",
         "progress_overall",
     ];
+    let table = options_of_the_table();
+    let elsewhere: Vec<&str> = elsewhere.into_iter().chain(table.iter().map(|field| field.name)).collect();
     let read = |options: &vg_options| unsafe { options.to_options() };
     assert_effects("vg_options", vg_options::initial(), read, &effects, &elsewhere);
     assert_eq!(read(&vg_options::initial()).unwrap(), Options::default(), "the defaults are Rust's");
@@ -140,6 +130,71 @@ fn each_option_of_a_reconstruction_sets_its_namesake() {
     let points = [[1.0f32, 2.0, 3.0], [4.0, 5.0, 6.0]];
     let options = vg_options { cloud: points.as_ptr().cast(), cloud_count: 2, ..vg_options::initial() };
     assert_eq!(unsafe { options.to_cloud() }.unwrap().unwrap().points(), points);
+}
+
+/// Options that C has from the library's table.
+fn options_of_the_table() -> Vec<Field> {
+    let fields = Options::fields().into_iter();
+    fields.filter(|field| !field.facts.apart.contains(&Face::C)).collect()
+}
+
+/// Values other than the default, each with its bytes in C: all names, and a number that no other option gets.
+fn others(field: &Field, i: u8) -> Vec<(options::Value, Vec<u8>)> {
+    use options::Value;
+    let int = |number: i32| number.to_ne_bytes().to_vec();
+    match field.kind {
+        Kind::Choice(e) => {
+            let others = e().variants.into_iter().map(|v| (Value::Name(v.name.into()), int(v.number)));
+            others.filter(|other| other.0 != field.default).collect()
+        }
+        Kind::Set(e) => {
+            e().variants.iter().map(|v| (Value::Names(vec![v.name.into()]), int(v.number))).collect()
+        }
+        Kind::Flag => {
+            let other = field.default == Value::Flag(false);
+            vec![(Value::Flag(other), int(other.into()))]
+        }
+        Kind::Whole => {
+            (0..=3u64).map(|n| (Value::Whole(n), int(n as i32))).filter(|o| o.0 != field.default).collect()
+        }
+        Kind::MaybeWhole => {
+            let number = 100 + usize::from(i);
+            vec![(Value::Whole(number as u64), number.to_ne_bytes().to_vec())]
+        }
+        Kind::Real | Kind::MaybeReal => {
+            let number = 0.25 + f64::from(i) / 256.0;
+            vec![(Value::Real(number), number.to_ne_bytes().to_vec())]
+        }
+    }
+}
+
+/// A field of C, found by the golden layout, sets the option of its name to the same value, and no other option.
+#[test]
+fn each_option_of_the_table_sets_its_namesake_and_nothing_else() {
+    let (table, layout) = (options_of_the_table(), golden_layout());
+    for (i, field) in table.iter().enumerate() {
+        let line =
+            layout.lines().find_map(|line| line.strip_prefix(&format!("vg_options.{} at ", field.name)));
+        let (at, size) = line.and_then(|line| line.split_once(" size ")).expect("a line of the layout");
+        for (value, bytes) in others(field, i as u8) {
+            assert_eq!(bytes.len().to_string(), size, "{}", field.name);
+            let mut options = vg_options::initial();
+            let at = (&raw mut options).cast::<u8>().wrapping_add(at.parse().unwrap());
+            unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), at, bytes.len()) };
+            let read = unsafe { options.to_options() }.unwrap();
+            for other in &table {
+                let expected = if other.name == field.name { &value } else { &other.default };
+                assert_eq!(
+                    read.get(other.name).as_ref(),
+                    Some(expected),
+                    "{} sets {}",
+                    field.name,
+                    other.name
+                );
+            }
+        }
+    }
+    assert!(table.len() >= 13);
 }
 
 #[test]

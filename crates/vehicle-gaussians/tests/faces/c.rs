@@ -1,6 +1,6 @@
 //! `src/capi`: the text that cbindgen makes `include/vg.h` of, and what converts C's options to the library's.
 
-use crate::text::{Entry, Named, merged, named_line, paragraph, shouted, within, wrapped};
+use crate::text::{Entry, Named, merged, named_line, paragraph, shouted, within, words_differ, wrapped};
 use vg::geometry::choice::Enumeration;
 use vg::geometry::measures::Measure;
 use vg::geometry::options::{Face, Field, Kind, Value};
@@ -98,7 +98,9 @@ fn conversion(field: &Field) -> String {
 fn documentation(measure: &Measure) -> String {
     match measure.name {
         // Stands behind `psnr_db` there.
-        "psnr_box_db" => "The same inside the bounding box of the mask; `None` where the mask is empty.".into(),
+        "psnr_box_db" => {
+            "The same inside the bounding box of the mask; `None` where the mask is empty.".into()
+        }
         _ => paragraph(measure.doc),
     }
 }
@@ -136,6 +138,33 @@ pub(crate) fn measures(source: &str) -> String {
     source
 }
 
+/// `src/capi/tests.rs`: the fields of the structs and the variants of the enumerations that are kept in step here.
+pub(crate) fn witness(source: &str) -> String {
+    let mut source = source.to_owned();
+    let structs =
+        [("options", "vg_options"), ("metrics", "vg_view_errors"), ("metrics", "vg_surface_errors")];
+    for (file, name) in structs {
+        let declared =
+            std::fs::read_to_string(vg_testing::root().join(format!("src/capi/{file}.rs"))).unwrap();
+        let from = declared.find(&format!("pub struct {name} {{\n")).unwrap();
+        let to = from + declared[from..].find("}\n").unwrap();
+        let fields = declared[from..to].lines().filter_map(|line| named_line(line, "    pub "));
+        let fields = fields.collect::<Vec<_>>().join(" ");
+        source = within(&source, &format!("\n        {name} {{"), "}", |list| {
+            let wanted = format!("\n{}        ", wrapped(&fields, "            ", "            "));
+            if words_differ(list, &wanted) { wanted } else { list.to_owned() }
+        });
+    }
+    for e in crate::enumerations() {
+        source = within(&source, &format!("\n        vg_{} {{ ", e.name), " }", |list| {
+            let own = if list.starts_with("None ") { "None " } else { "" };
+            let idents: Vec<&str> = by_number(&e).iter().map(|v| v.ident).collect();
+            format!("{own}{}", idents.join(" "))
+        });
+    }
+    source
+}
+
 /// The variants of every enumeration that a file has.
 pub(crate) fn enumerations(source: &str) -> String {
     let mut source = source.to_owned();
@@ -152,7 +181,7 @@ pub(crate) fn enumerations(source: &str) -> String {
             let documented = source[..attributes].rfind("\n\n").unwrap() + 2;
             let doc = wrapped(&translated(&paragraph(e.doc)), "/// ", "/// ");
             let written = &source[documented..attributes];
-            if crate::text::words_differ(written, &doc) && e.name != "calibration" {
+            if words_differ(written, &doc) && e.name != "calibration" {
                 source.replace_range(documented..attributes, &doc);
             }
         }

@@ -72,6 +72,11 @@ fn the_enumerations_of_c_are_the_librarys() {
 }
 
 #[test]
+fn the_second_witness_of_the_abi_names_them_all() {
+    assert_in_step("src/capi/tests.rs", c::witness);
+}
+
+#[test]
 fn the_measures_of_c_are_the_librarys() {
     assert_in_step("src/capi/metrics.rs", c::measures);
 }
