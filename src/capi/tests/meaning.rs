@@ -12,11 +12,12 @@ use std::ops::ControlFlow;
 use std::sync::OnceLock;
 use vg::Error;
 use vg::calibrate::Verdict;
+use vg::geometry::Choice;
 use vg::geometry::camera::CameraModel;
 use vg::geometry::options::{self, Face, Field, Kind};
 use vg::io::{SceneOptions, open_scene};
 use vg::onnx::ModelOptions;
-use vg::pipeline::{self, InputError, Options, PriorChoice, Reason, ReasonCode, Report, Severity};
+use vg::pipeline::{self, InputError, KeepItem, Options, PriorChoice, Reason, ReasonCode, Report, Severity};
 use vg::refine::{Amount, RefineOptions, Refinement, Stop};
 use vg::relight::Relighting;
 use vg::render::{Background, RenderOptions};
@@ -465,6 +466,17 @@ fn each_figure_of_a_report_is_rusts_number_and_the_jsons() {
 struct Held(BTreeSet<String>);
 
 impl Held {
+    /// Every variant of an enumeration that C shares with the library, and what Rust makes of its number.
+    #[track_caller]
+    fn all<T: Choice + Debug>(&mut self, enumeration: &str, rust: impl Fn(i32) -> T) {
+        let numbers = numbers_of_rust();
+        for variant in T::ALL.iter().map(|choice| choice.variant()) {
+            let line = format!("{} = {}", enumerator(enumeration, variant.ident), variant.number);
+            assert!(numbers.contains(&line), "C has no {line}");
+            self.namesakes(enumeration, format_args!("{}", variant.ident), rust(variant.number));
+        }
+    }
+
     /// `variant` of an enumeration of C, and what Rust makes of it: of the same name but for capitals.
     #[track_caller]
     fn namesakes(&mut self, enumeration: &str, variant: impl Debug, rust: impl Debug) {
@@ -485,31 +497,15 @@ fn each_enumerator_means_its_namesake_in_rust() {
         set(&mut options);
         unsafe { options.to_options() }.unwrap()
     };
-    for prior in [vg_prior::Auto, vg_prior::Given, vg_prior::Hull, vg_prior::Onnx, vg_prior::Shape] {
-        held.namesakes("vg_prior", prior, options(&|o| o.prior = prior as i32).prior);
-        if prior != vg_prior::Auto {
-            let name = format!("{prior:?}").to_lowercase();
-            let report = Report { prior: Box::leak(name.into_boxed_str()), ..report() };
-            assert_eq!(vg_report_figures::of(&report).prior, prior as i32);
-        }
+    held.all("vg_prior", |n| options(&|o| o.prior = n).prior);
+    for prior in PriorChoice::ALL.iter().filter(|prior| **prior != PriorChoice::Auto) {
+        assert_eq!(vg_report_figures::of(&Report { prior: prior.name(), ..report() }).prior, prior.number());
     }
-    for symmetry in [vg_symmetry::Auto, vg_symmetry::Always, vg_symmetry::Never, vg_symmetry::Flip] {
-        held.namesakes("vg_symmetry", symmetry, options(&|o| o.symmetry = symmetry as i32).symmetry);
-    }
-    for calibrate in [vg_calibrate::Auto, vg_calibrate::Off] {
-        held.namesakes("vg_calibrate", calibrate, options(&|o| o.calibrate = calibrate as i32).calibrate);
-    }
-    for relight in [vg_relight::Auto, vg_relight::Never] {
-        held.namesakes("vg_relight", relight, options(&|o| o.relight = relight as i32).relight);
-    }
-    for bit in [
-        vg_keep::DuplicateViews,
-        vg_keep::Overlap,
-        vg_keep::SilhouetteEdge,
-        vg_keep::Floaters,
-        vg_keep::ShBands,
-    ] {
-        let keep = serde_json::to_value(options(&|o| o.keep = bit as u32).keep).unwrap();
+    held.all("vg_symmetry", |n| options(&|o| o.symmetry = n).symmetry);
+    held.all("vg_calibrate", |n| options(&|o| o.calibrate = n).calibrate);
+    held.all("vg_relight", |n| options(&|o| o.relight = n).relight);
+    for bit in KeepItem::ALL {
+        let keep = serde_json::to_value(options(&|o| o.keep = bit.number() as u32).keep).unwrap();
         let kept: Vec<&String> = keep
             .as_object()
             .unwrap()
@@ -563,9 +559,7 @@ fn each_enumerator_means_its_namesake_in_rust() {
     for alpha in [vg_alpha::Straight, vg_alpha::Premultiplied] {
         held.namesakes("vg_alpha", alpha, drawing(&|o| o.alpha = alpha as i32).1);
     }
-    for mode in [vg_depth_mode::Expected, vg_depth_mode::Accumulated] {
-        held.namesakes("vg_depth_mode", mode, drawing(&|o| o.depth_mode = mode as i32).0.depth_mode);
-    }
+    held.all("vg_depth_mode", |n| drawing(&|o| o.depth_mode = n).0.depth_mode);
     for backend in [vg_backend::Auto, vg_backend::Cpu, vg_backend::Gpu] {
         match render::backend("backend", backend as i32) {
             Ok(rust) => held.namesakes("vg_backend", backend, rust),
@@ -575,10 +569,7 @@ fn each_enumerator_means_its_namesake_in_rust() {
             Err(other) => panic!("{other}"),
         }
     }
-    for heading in [vg_heading::Auto, vg_heading::Forward, vg_heading::Backward] {
-        let options = vg_align_options { heading: heading as i32, ..vg_align_options::initial() };
-        held.namesakes("vg_heading", heading, options.heading().unwrap());
-    }
+    held.all("vg_heading", |n| vg_align_options { heading: n, ..vg_align_options::initial() }.heading().unwrap());
     for model in CameraModel::ALL {
         let named = [
             vg_camera_model::SimplePinhole,
@@ -597,9 +588,7 @@ fn each_enumerator_means_its_namesake_in_rust() {
         set(&mut options);
         unsafe { options.read() }.unwrap()
     };
-    for provider in [vg_provider::Cpu, vg_provider::Cuda] {
-        held.namesakes("vg_provider", provider, opening(&|o| o.provider = provider as i32).provider);
-    }
+    held.all("vg_provider", |n| opening(&|o| o.provider = n).provider);
     for (prepack, rust) in
         [(vg_prepack::Auto, None), (vg_prepack::Always, Some(true)), (vg_prepack::Never, Some(false))]
     {

@@ -1,6 +1,8 @@
 //! The command line: commands and their options.
 
 mod align;
+#[cfg(test)]
+mod documented;
 mod eval;
 mod method;
 mod report;
