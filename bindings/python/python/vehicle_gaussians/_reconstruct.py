@@ -111,7 +111,6 @@ def reconstruct(
     at most 1.
     max_views: use at most this many views, chosen to spread best around the vehicle; a budget may choose fewer. None:
     all.
-    None: all.
     max_gaussians: largest number of Gaussians, estimated from the masks; where they would give more, the views are
     resampled to fewer pixels, and the report says so. None: any number.
     refine_iterations, refine_seconds: optimise the model against the photographs, by so many steps, or by as many as fit

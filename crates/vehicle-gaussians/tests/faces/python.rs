@@ -83,10 +83,13 @@ pub(crate) fn reconstruct(source: &str) -> String {
     })
 }
 
-/// `    prior: ...` of a docstring.
+/// `    prior: ...` of a docstring; other words before a colon, as in "None: all", name no parameter.
 fn documented(line: &str) -> Option<String> {
     let (names, rest) = line.strip_prefix("    ")?.split_once(": ")?;
-    let is_name = |name: &str| !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '_');
+    let is_name = |name: &str| {
+        name.starts_with(|c: char| c.is_ascii_lowercase())
+            && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+    };
     (!rest.is_empty() && names.split(", ").all(is_name)).then(|| names.to_owned())
 }
 
