@@ -7,11 +7,11 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-if [ -n "$(git status --porcelain -- src include)" ]; then
+if [ -n "$(git status --porcelain -- src include crates)" ]; then
     echo "src/ or include/ has changes that are not committed" >&2
     exit 1
 fi
-restore() { git checkout --quiet -- src include; }
+restore() { git checkout --quiet -- src include crates; }
 trap restore EXIT
 only=${1:-}
 unnoticed=0
@@ -31,7 +31,7 @@ attempt() {
     esac
     restore
     "$@"
-    if git diff --quiet -- src include; then
+    if git diff --quiet -- src include crates; then
         echo "$what: the change did not apply" >&2
         exit 1
     fi
@@ -50,15 +50,15 @@ remove_function() { perl -0pi -e 's/#\[unsafe\(no_mangle\)\]\n(pub unsafe extern
 shrink_struct() { perl -pi -e 's/\[u64; 4\]/[u64; 3]/; s/\[0; 4\]/[0; 3]/' src/capi/camera.rs; }
 change_type() { perl -0pi -e 's/fn vg_context_threads\(context: \*const vg_context\) -> u32/fn vg_context_threads(context: *const vg_context) -> u64/; s/w\.threads\.count\(\) as u32/w.threads.count() as u64/' src/capi/context.rs; }
 change_comment() { perl -pi -e 's/Makes a context\./Makes one context./' src/capi/context.rs; }
-change_behaviour() { perl -pi -e 's/sh_degree: 2,/sh_degree: 1,/' src/capi/options.rs; }
+change_behaviour() { perl -pi -e 's/sh_degree: i32::from\(rust\.sh_degree\),/sh_degree: 1,/' src/capi/options.rs; }
 
 # Changes of meaning with the same fields, names and numbers, which no type shows.
-change_default() { perl -pi -e 's/^(            photo:) 1,/$1 0,/' src/capi/options.rs; }
+change_default() { perl -pi -e 's/^(            photo:) i32::from\(rust\.photo\),/$1 0,/' src/capi/options.rs; }
 swap_length_and_width() { perl -pi -e 's/\|b\| b\.size_m\)/|b| [b.size_m[1], b.size_m[0], b.size_m[2]])/' src/capi/report.rs; }
 seconds_for_milliseconds() { perl -pi -e 's/total_ms: report\.total_ms,/total_ms: report.total_ms \/ 1e3,/' src/capi/report.rs; }
 change_sign() { perl -pi -e 's/\|c\| c\.lateral_m\)/|c| -c.lateral_m)/' src/capi/report.rs; }
 swap_log_levels() { perl -pi -e 's/vg_log_level::(Info|Debug), \|\| format/"vg_log_level::" . ($1 eq "Info" ? "Debug" : "Info") . ", || format"/e' src/capi/reconstruct.rs; }
-swap_keep_bits() { perl -pi -e 's/has\(vg_keep::(Overlap|Floaters)\)/"has(vg_keep::" . ($1 eq "Overlap" ? "Floaters" : "Overlap") . ")"/e' src/capi/options.rs; }
+swap_keep_bits() { perl -pi -e 's/KeepItem::(Overlap|Floaters) => &mut/"KeepItem::" . ($1 eq "Overlap" ? "Floaters" : "Overlap") . " => &mut"/e' crates/vehicle-gaussians/src/pipeline/options.rs; }
 swap_precision_and_recall() { perl -pi -e 's/errors\.(precision|recall),/"errors." . ($1 eq "recall" ? "precision" : "recall") . ","/e' src/capi/metrics.rs; }
 swap_red_and_blue() { perl -pi -e 's/Background::Color\(self\.background_color\)/Background::Color({ let [r, g, b] = self.background_color; [b, g, r] })/' src/capi/render.rs; }
 

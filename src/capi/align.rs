@@ -58,7 +58,7 @@ unsafe impl Versioned for vg_align_options {
         Self {
             struct_size: size_of::<Self>(),
             context: std::ptr::null_mut(),
-            heading: vg_heading::Auto as i32,
+            heading: Heading::default().number(),
             flags: 0,
             progress: None,
             progress_user: std::ptr::null_mut(),
@@ -300,13 +300,8 @@ impl vg_align_options {
     }
 
     pub(super) fn heading(&self) -> Result<Heading> {
-        const HEADINGS: [(i32, &str, Heading); 3] = [
-            (vg_heading::Auto as i32, "auto", Heading::Auto),
-            (vg_heading::Forward as i32, "forward", Heading::Forward),
-            (vg_heading::Backward as i32, "backward", Heading::Backward),
-        ];
         read::zero("options.flags", self.flags == 0)?;
-        read::choice("options.heading", self.heading, &HEADINGS)
+        read::choice("options.heading", self.heading)
     }
 }
 

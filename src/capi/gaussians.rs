@@ -8,7 +8,7 @@ use std::ffi::c_char;
 use std::sync::Arc;
 use vg::gaussians::{Gaussians, sh};
 use vg::geometry::Similarity;
-use vg::io::ply;
+use vg::io::splats;
 use vg::progress::Threads;
 use vg::{Error, Result};
 
@@ -169,7 +169,7 @@ pub unsafe extern "C" fn vg_gaussians_load_ply(
 ) -> vg_status {
     unsafe {
         make(out, out_error, || {
-            let (gaussians, _notes) = ply::read(read::path("path", path)?)?;
+            let (gaussians, _notes) = splats::read(read::path("path", path)?)?;
             Ok(gaussians)
         })
     }
@@ -189,7 +189,7 @@ pub unsafe extern "C" fn vg_gaussians_save_ply(
     unsafe {
         guarded(out_error, || {
             let gaussians = required("gaussians", gaussians)?;
-            ply::write(read::path("path", path)?, gaussians)
+            splats::write(read::path("path", path)?, gaussians)
         })
     }
 }

@@ -176,7 +176,7 @@ pub(super) unsafe fn on_white(argument: &str, image: &vg_image) -> Result<Vec<[f
 /// Checks that the picture has one of these formats and that its reserved fields are zero.
 fn checked_format<T: Copy>(argument: &str, image: &vg_image, formats: &[(i32, &str, T)]) -> Result<T> {
     read::zero(&format!("{argument}.flags"), image.flags == 0)?;
-    read::choice(&format!("{argument}.format"), image.format, formats)
+    read::one_of(&format!("{argument}.format"), image.format, formats)
 }
 
 /// The bytes from the first to the last pixel, and the stride, after checking that their number does not overflow.

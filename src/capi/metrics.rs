@@ -271,16 +271,7 @@ pub unsafe extern "C" fn vg_metrics_view(
                     let drawn = renderer.render(gaussians, &view.camera, &RenderOptions::default())?;
                     let errors = ViewErrors::of(&drawn, &view);
                     let lpips = lpips.map_or(Ok(None), |lpips| lpips.of(&drawn, &view))?;
-                    Ok(vg_view_errors {
-                        struct_size: size_of::<vg_view_errors>(),
-                        psnr_db: errors.psnr_db,
-                        psnr_box_db: or_nan(errors.psnr_box_db),
-                        ssim: or_nan(errors.ssim),
-                        lpips: or_nan(lpips),
-                        silhouette_iou: errors.silhouette_iou,
-                        depth_mae_m: or_nan(errors.depth_mae_m),
-                        depth_p90_m: or_nan(errors.depth_p90_m),
-                    })
+                    Ok(vg_view_errors { lpips: or_nan(lpips), ..vg_view_errors::from(&errors) })
                 })
             })?;
             read::fill("out", out, &errors)
@@ -324,23 +315,39 @@ pub unsafe extern "C" fn vg_metrics_surface(
                 })
             })
             .map_err(|e| read::renamed(e, &[("scan", "points")]))?;
-            read::fill(
-                "out",
-                out,
-                &vg_surface_errors {
-                    struct_size: size_of::<vg_surface_errors>(),
-                    accuracy_m: errors.accuracy_m,
-                    completeness_m: errors.completeness_m,
-                    chamfer_m: errors.chamfer_m,
-                    precision: errors.precision,
-                    recall: errors.recall,
-                    f_score: errors.f_score,
-                    length_error_percent: errors.length_error_percent,
-                    width_error_percent: errors.width_error_percent,
-                    height_error_percent: errors.height_error_percent,
-                },
-            )
+            read::fill("out", out, &vg_surface_errors::from(&errors))
         })
+    }
+}
+
+impl From<&ViewErrors> for vg_view_errors {
+    fn from(errors: &ViewErrors) -> Self {
+        Self {
+            psnr_db: errors.psnr_db,
+            psnr_box_db: or_nan(errors.psnr_box_db),
+            ssim: or_nan(errors.ssim),
+            silhouette_iou: errors.silhouette_iou,
+            depth_mae_m: or_nan(errors.depth_mae_m),
+            depth_p90_m: or_nan(errors.depth_p90_m),
+            ..Self::initial()
+        }
+    }
+}
+
+impl From<&SurfaceErrors> for vg_surface_errors {
+    fn from(errors: &SurfaceErrors) -> Self {
+        Self {
+            accuracy_m: errors.accuracy_m,
+            completeness_m: errors.completeness_m,
+            chamfer_m: errors.chamfer_m,
+            precision: errors.precision,
+            recall: errors.recall,
+            f_score: errors.f_score,
+            length_error_percent: errors.length_error_percent,
+            width_error_percent: errors.width_error_percent,
+            height_error_percent: errors.height_error_percent,
+            ..Self::initial()
+        }
     }
 }
 

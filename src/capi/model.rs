@@ -5,7 +5,7 @@ use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
 use std::ffi::c_char;
 use vg::Result;
-use vg::onnx::{Model, ModelOptions, Provider};
+use vg::onnx::{Model, ModelOptions};
 
 /// An open ONNX model; `vg_options.prior_model` and `vg_options.head_model` lend it to calls. Any number of threads
 /// may use one model at a time, each with a context of its own or all with one; runs of the same model take turns. It
@@ -72,7 +72,7 @@ unsafe impl Versioned for vg_model_options {
         Self {
             struct_size: size_of::<Self>(),
             runtime: std::ptr::null(),
-            provider: vg_provider::Cpu as i32,
+            provider: rust.provider.number(),
             fall_back: i32::from(rust.fall_back),
             threads: rust.threads as u32,
             prepack: vg_prepack::Auto as i32,
@@ -84,10 +84,6 @@ unsafe impl Versioned for vg_model_options {
 
 impl vg_model_options {
     pub(super) unsafe fn read(&self) -> Result<ModelOptions> {
-        let providers = [
-            (vg_provider::Cpu as i32, "cpu", Provider::Cpu),
-            (vg_provider::Cuda as i32, "cuda", Provider::Cuda),
-        ];
         let prepacks = [
             (vg_prepack::Auto as i32, "auto", None),
             (vg_prepack::Always as i32, "always", Some(true)),
@@ -100,10 +96,10 @@ impl vg_model_options {
         };
         Ok(ModelOptions {
             runtime,
-            provider: read::choice("options.provider", self.provider, &providers)?,
+            provider: read::choice("options.provider", self.provider)?,
             fall_back: read::flag("options.fall_back", self.fall_back)?,
             threads: self.threads as usize,
-            prepack: read::choice("options.prepack", self.prepack, &prepacks)?,
+            prepack: read::one_of("options.prepack", self.prepack, &prepacks)?,
             arena: read::flag("options.arena", self.arena)?,
         })
     }

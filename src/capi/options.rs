@@ -4,15 +4,15 @@ use super::context::vg_context;
 use super::guard::guarded;
 use super::model::{self, vg_model};
 use super::read::{self, Versioned};
-use super::render::{backend, vg_backend};
+use super::render::backend;
 use super::status::{c_string, one_line, vg_status};
 use std::ffi::{CString, c_char, c_void};
-use vg::pipeline::{Calibrate, DEFAULT_MAX_GAUSSIANS, Keep, Options, PriorChoice};
+use vg::geometry::Choice;
+use vg::pipeline::{Keep, KeepItem, Options};
 use vg::refine::{Amount, RefineOptions};
-use vg::relight::Relight;
+use vg::render::Backend;
 use vg::scene::cloud::MAX_CLOUD_POINTS;
 use vg::scene::{Cloud, Place, VehicleBox};
-use vg::symmetry::SymmetryMode;
 use vg::{Error, Result};
 
 /// Where metric depth comes from.
@@ -207,84 +207,64 @@ unsafe impl Versioned for vg_options {
     const FIRST_SIZE: usize = 96;
 
     fn initial() -> Self {
+        let rust = Options::default();
         Self {
             struct_size: size_of::<Self>(),
             context: std::ptr::null_mut(),
-            prior: vg_prior::Auto as i32,
-            symmetry: vg_symmetry::Auto as i32,
-            sh_degree: 2,
-            keep: 0,
-            check: 1,
-            points: 0,
+            prior: rust.prior.number(),
+            symmetry: rust.symmetry.number(),
+            sh_degree: i32::from(rust.sh_degree),
+            keep: keep_bits(rust.keep),
+            check: i32::from(rust.check),
+            points: i32::from(rust.points),
             vehicle_size: [0.0; 3],
             progress: None,
             progress_user: std::ptr::null_mut(),
             log: None,
             log_user: std::ptr::null_mut(),
-            calibrate: vg_calibrate::Auto as i32,
-            relight: vg_relight::Auto as i32,
-            photo: 1,
+            calibrate: rust.calibrate.number(),
+            relight: rust.relight.number(),
+            photo: i32::from(rust.photo),
             flags: 0,
-            budget_s: 0.0,
+            budget_s: rust.budget_s.unwrap_or(0.0),
             cloud: std::ptr::null(),
             cloud_count: 0,
-            resolution: 1.0,
-            max_views: 0,
+            resolution: rust.resolution,
+            max_views: rust.max_views.unwrap_or(0),
             prior_model: std::ptr::null(),
             head_model: std::ptr::null(),
             refine_seconds: 0.0,
             refine_iterations: 0,
             refine_hold_out: 0,
-            refine_backend: vg_backend::Auto as i32,
+            refine_backend: Backend::default().number(),
             refine_flags: 0,
             vehicle_center: [0.0; 3],
             vehicle_yaw: 0.0,
             has_vehicle_place: 0,
             vehicle_flags: 0,
             progress_overall: std::ptr::null_mut(),
-            max_gaussians: DEFAULT_MAX_GAUSSIANS,
+            max_gaussians: rust.max_gaussians.unwrap_or(0),
         }
     }
 }
 
 impl vg_options {
     pub(super) unsafe fn to_options(self) -> Result<Options> {
-        let priors = [
-            (vg_prior::Auto as i32, "auto", PriorChoice::Auto),
-            (vg_prior::Given as i32, "given", PriorChoice::Given),
-            (vg_prior::Hull as i32, "hull", PriorChoice::Hull),
-            (vg_prior::Onnx as i32, "onnx", PriorChoice::Onnx),
-            (vg_prior::Shape as i32, "shape", PriorChoice::Shape),
-        ];
-        let symmetries = [
-            (vg_symmetry::Auto as i32, "auto", SymmetryMode::Auto),
-            (vg_symmetry::Always as i32, "always", SymmetryMode::Always),
-            (vg_symmetry::Never as i32, "never", SymmetryMode::Never),
-            (vg_symmetry::Flip as i32, "flip", SymmetryMode::Flip),
-        ];
-        let calibrations = [
-            (vg_calibrate::Auto as i32, "auto", Calibrate::Auto),
-            (vg_calibrate::Off as i32, "off", Calibrate::Off),
-        ];
-        let relightings = [
-            (vg_relight::Auto as i32, "auto", Relight::Auto),
-            (vg_relight::Never as i32, "never", Relight::Never),
-        ];
         read::zero("options.flags", self.flags == 0)?;
         read::zero("options.vehicle_flags", self.vehicle_flags == 0)?;
         let unknown_size = self.vehicle_size == [0.0; 3];
         let vehicle_place = self.vehicle_place()?;
         Ok(Options {
-            prior: read::choice("options.prior", self.prior, &priors)?,
+            prior: read::choice("options.prior", self.prior)?,
             prior_model: unsafe { model::lent(self.prior_model) },
             head_model: unsafe { model::lent(self.head_model) },
-            symmetry: read::choice("options.symmetry", self.symmetry, &symmetries)?,
+            symmetry: read::choice("options.symmetry", self.symmetry)?,
             vehicle_size: (!unknown_size).then_some(self.vehicle_size),
             vehicle_place,
-            sh_degree: sh_degree("options.sh_degree", self.sh_degree)?,
+            sh_degree: read::whole("options.sh_degree", self.sh_degree, "0 to 3")?,
             keep: keep(self.keep)?,
-            calibrate: read::choice("options.calibrate", self.calibrate, &calibrations)?,
-            relight: read::choice("options.relight", self.relight, &relightings)?,
+            calibrate: read::choice("options.calibrate", self.calibrate)?,
+            relight: read::choice("options.relight", self.relight)?,
             check: read::flag("options.check", self.check)?,
             refine: self.refinement()?,
             photo: read::flag("options.photo", self.photo)?,
@@ -292,9 +272,8 @@ impl vg_options {
             resolution: self.resolution,
             max_views: (self.max_views != 0).then_some(self.max_views),
             max_gaussians: (self.max_gaussians != 0).then_some(self.max_gaussians),
-            ignore_offset: false,
             points: read::flag("options.points", self.points)?,
-            threads: 0,
+            ..Options::default()
         })
     }
 
@@ -357,18 +336,17 @@ pub(super) fn sh_degree(argument: &str, degree: i32) -> Result<u8> {
     }
 }
 
+fn keep_bits(keep: Keep) -> u32 {
+    keep.items().fold(0, |bits, item| bits | item.number() as u32)
+}
+
 fn keep(bits: u32) -> Result<Keep> {
-    let has = |bit: vg_keep| bits & bit as u32 != 0;
-    if bits > 31 {
-        return Err(Error::argument("options.keep", format!("{bits:#x}"), "bits of vg_keep, 0 to 31"));
+    let every = KeepItem::ALL.iter().fold(0, |bits, item| bits | item.number() as u32);
+    if bits & !every != 0 {
+        let allowed = format!("bits of vg_keep, 0 to {every}");
+        return Err(Error::argument("options.keep", format!("{bits:#x}"), allowed));
     }
-    Ok(Keep {
-        duplicate_views: has(vg_keep::DuplicateViews),
-        overlap: has(vg_keep::Overlap),
-        silhouette_edge: has(vg_keep::SilhouetteEdge),
-        floaters: has(vg_keep::Floaters),
-        sh_bands: has(vg_keep::ShBands),
-    })
+    Ok(Keep::from_items(KeepItem::ALL.iter().copied().filter(|item| bits & item.number() as u32 != 0)))
 }
 
 /// The caller's log callback, if any.

@@ -2,6 +2,7 @@
 
 use std::ffi::{CStr, c_char};
 use std::path::Path;
+use vg::geometry::Choice;
 use vg::{Error, Result};
 
 /// A struct of the ABI that may grow.
@@ -216,17 +217,27 @@ pub(super) fn address<T, U>(values: &[T]) -> *const U {
     if values.is_empty() { std::ptr::null() } else { values.as_ptr().cast() }
 }
 
-/// The value of an enumerator's number, checked.
-pub(super) fn choice<T: Copy>(argument: &str, number: i32, choices: &[(i32, &str, T)]) -> Result<T> {
+/// The choice with a number, checked.
+pub(super) fn choice<T: Choice>(argument: &str, number: i32) -> Result<T> {
+    T::from_number(argument, number)
+}
+
+/// The value of an enumerator's number, checked, for enumerations that only C has and for parts of others.
+pub(super) fn one_of<T: Copy>(argument: &str, number: i32, choices: &[(i32, &str, T)]) -> Result<T> {
     choices.iter().find(|(n, ..)| *n == number).map(|(.., value)| *value).ok_or_else(|| {
         let names: Vec<String> = choices.iter().map(|(n, name, _)| format!("{n} ({name})")).collect();
         Error::argument(argument, number.to_string(), names.join(", "))
     })
 }
 
+/// A whole number that is not negative and fits into its type.
+pub(super) fn whole<T: TryFrom<i32>>(argument: &str, number: i32, allowed: &str) -> Result<T> {
+    T::try_from(number).map_err(|_| Error::argument(argument, number.to_string(), allowed))
+}
+
 /// A boolean that is passed as a number.
 pub(super) fn flag(argument: &str, number: i32) -> Result<bool> {
-    choice(argument, number, &[(0, "no", false), (1, "yes", true)])
+    one_of(argument, number, &[(0, "no", false), (1, "yes", true)])
 }
 
 /// Renames the argument or field of an error from the library's name, `from`, to C's name, `to`.

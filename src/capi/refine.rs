@@ -5,13 +5,14 @@ use super::gaussians::{self, vg_gaussians};
 use super::guard::{clear, guarded};
 use super::options::vg_progress_fn;
 use super::read::{self, Versioned};
-use super::render::{backend, vg_backend};
+use super::render::backend;
 use super::status::{vg_error, vg_status};
 use super::view::{self, vg_view};
 use super::watched::ProgressCallback;
 use std::ffi::c_void;
 use vg::Result;
 use vg::refine::{self, Amount, Densify, RefineOptions, Refinement, Stop};
+use vg::render::Backend;
 
 /// Settings of `vg_refine`.
 #[repr(C)]
@@ -55,7 +56,7 @@ unsafe impl Versioned for vg_refine_options {
             iterations: 300,
             hold_out: 0,
             densify: 0,
-            backend: vg_backend::Auto as i32,
+            backend: Backend::default().number(),
             progress: None,
             progress_user: std::ptr::null_mut(),
             flags: 0,
@@ -133,7 +134,7 @@ unsafe impl Versioned for vg_refinement {
             iterations: 0,
             made: 0,
             kept: 0,
-            stop: vg_refine_stop::Done as i32,
+            stop: Stop::Done.number(),
             psnr_before_db: f64::NAN,
             psnr_after_db: f64::NAN,
             held_out_before_db: f64::NAN,
@@ -144,18 +145,12 @@ unsafe impl Versioned for vg_refinement {
 
 impl From<&Refinement> for vg_refinement {
     fn from(done: &Refinement) -> Self {
-        let stop = match done.stop {
-            Stop::Done => vg_refine_stop::Done,
-            Stop::HeldOut => vg_refine_stop::HeldOut,
-            Stop::Diverged => vg_refine_stop::Diverged,
-            Stop::Unseen => vg_refine_stop::Unseen,
-        };
         let held_out = done.held_out.as_ref().map_or([f64::NAN; 2], |view| view.psnr_db);
         Self {
             iterations: done.iterations,
             made: done.made,
             kept: done.kept,
-            stop: stop as i32,
+            stop: done.stop.number(),
             psnr_before_db: done.psnr_db[0],
             psnr_after_db: done.psnr_db[1],
             held_out_before_db: held_out[0],

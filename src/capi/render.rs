@@ -12,7 +12,7 @@ use super::status::{vg_error, vg_status};
 use super::watched::{ProgressCallback, watched};
 use std::ffi::c_void;
 use vg::render::backend::{Trainer, is_built, not_built, trainer};
-use vg::render::{Backend, Background, DepthMode, RenderOptions, Rendered};
+use vg::render::{Backend, Background, RenderOptions, Rendered};
 use vg::{Error, Result};
 
 /// What draws.
@@ -107,11 +107,11 @@ unsafe impl Versioned for vg_render_options {
         Self {
             struct_size: size_of::<Self>(),
             context: std::ptr::null_mut(),
-            backend: vg_backend::Auto as i32,
+            backend: Backend::default().number(),
             background: vg_background::Color as i32,
             background_color: [1.0; 3],
             alpha: vg_alpha::Straight as i32,
-            depth_mode: vg_depth_mode::Expected as i32,
+            depth_mode: rust.depth_mode.number(),
             sh_degree: i32::from(rust.sh_degree),
             antialiased: i32::from(rust.antialiased),
             blur: rust.blur,
@@ -233,7 +233,7 @@ pub unsafe extern "C" fn vg_render(
 
 /// The GPU renderer, if the options choose it.
 pub(super) fn device(options: &vg_render_options) -> Result<Option<Trainer>> {
-    match options.backend == vg_backend::Gpu as i32 {
+    match options.backend == Backend::Gpu.number() {
         true => Ok(Some(trainer(Backend::Gpu)?.0)),
         false => Ok(None),
     }
@@ -241,12 +241,7 @@ pub(super) fn device(options: &vg_render_options) -> Result<Option<Trainer>> {
 
 /// The chosen renderer; an error if this build lacks it.
 pub(super) fn backend(argument: &str, number: i32) -> Result<Backend> {
-    let backends = [
-        (vg_backend::Auto as i32, "auto", Backend::Auto),
-        (vg_backend::Cpu as i32, "cpu", Backend::Cpu),
-        (vg_backend::Gpu as i32, "gpu", Backend::Gpu),
-    ];
-    match read::choice(argument, number, &backends)? {
+    match read::choice(argument, number)? {
         Backend::Gpu if !is_built() => Err(not_built(argument)),
         backend => Ok(backend),
     }
@@ -268,20 +263,16 @@ impl vg_render_options {
             (vg_alpha::Straight as i32, "straight", vg_alpha::Straight),
             (vg_alpha::Premultiplied as i32, "premultiplied", vg_alpha::Premultiplied),
         ];
-        let depth_modes = [
-            (vg_depth_mode::Expected as i32, "expected", DepthMode::Expected),
-            (vg_depth_mode::Accumulated as i32, "accumulated", DepthMode::Accumulated),
-        ];
         read::zero("options.flags", self.flags == 0)?;
         let settings = RenderOptions {
-            background: read::choice("options.background", self.background, &backgrounds)?,
+            background: read::one_of("options.background", self.background, &backgrounds)?,
             blur: self.blur,
             antialiased: read::flag("options.antialiased", self.antialiased)?,
             near: self.near_plane,
             far: self.far_plane,
             max_alpha: self.max_alpha,
             sh_degree: sh_degree("options.sh_degree", self.sh_degree)?,
-            depth_mode: read::choice("options.depth_mode", self.depth_mode, &depth_modes)?,
+            depth_mode: read::choice("options.depth_mode", self.depth_mode)?,
         };
         let names = [
             ("options.background", "options.background_color"),
@@ -289,7 +280,7 @@ impl vg_render_options {
             ("options.far", "options.far_plane"),
         ];
         settings.validate().map_err(|e| read::renamed(e, &names))?;
-        Ok((settings, read::choice("options.alpha", self.alpha, &alphas)?))
+        Ok((settings, read::one_of("options.alpha", self.alpha, &alphas)?))
     }
 }
 
@@ -456,7 +447,7 @@ fn layout(argument: &str, format: i32, opaque: bool) -> Result<Layout> {
         (vg_format::Bgr8 as i32, "BGR8", Layout::Bgr8),
     ];
     // A format without alpha cannot store transparency.
-    read::choice(argument, format, if opaque { &all } else { &all[..3] })
+    read::one_of(argument, format, if opaque { &all } else { &all[..3] })
 }
 
 impl Pixel {

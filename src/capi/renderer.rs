@@ -6,7 +6,7 @@ use super::gaussians::{self, vg_gaussians};
 use super::guard::{clear, free, guarded, guarded_value};
 use super::overlap;
 use super::read::{self, Versioned};
-use super::render::{Target, backend, vg_backend, vg_image_target, vg_render_options};
+use super::render::{Target, backend, vg_image_target, vg_render_options};
 use super::status::{c_string, vg_error, vg_status};
 use super::watched::watched;
 use std::ffi::{CString, c_char};
@@ -45,7 +45,7 @@ unsafe impl Versioned for vg_renderer_options {
         Self {
             struct_size: size_of::<Self>(),
             context: std::ptr::null_mut(),
-            backend: vg_backend::Auto as i32,
+            backend: Backend::default().number(),
             flags: 0,
         }
     }
@@ -173,11 +173,11 @@ pub unsafe extern "C" fn vg_renderer_render(
 /// Who draws: `VG_BACKEND_CPU` or `VG_BACKEND_GPU`. NULL: `VG_BACKEND_AUTO`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn vg_renderer_backend(renderer: *const vg_renderer) -> i32 {
-    guarded_value(vg_backend::Auto as i32, || {
-        unsafe { renderer.cast::<RendererObject>().as_ref() }.map_or(vg_backend::Auto as i32, |r| {
+    guarded_value(Backend::Auto.number(), || {
+        unsafe { renderer.cast::<RendererObject>().as_ref() }.map_or(Backend::Auto.number(), |r| {
             match r.ready.choice().backend {
-                Backend::Gpu => vg_backend::Gpu as i32,
-                _ => vg_backend::Cpu as i32,
+                Backend::Auto => Backend::Cpu.number(),
+                chosen => chosen.number(),
             }
         })
     })

@@ -1,12 +1,11 @@
 //! Report of a reconstruction.
 
 use super::guard::{free, guarded, guarded_value};
-use super::options::vg_prior;
 use super::read::{self, Versioned};
 use super::status::{c_string, one_line, vg_error, vg_status};
 use std::ffi::{CString, c_char};
-use vg::calibrate::Verdict;
-use vg::pipeline::{self, PointCloud, Report};
+use vg::geometry::Choice;
+use vg::pipeline::{PointCloud, PriorChoice, Report, Verdict};
 
 /// What a reconstruction did, how long it took, what it left out, and the error it can know. Owned by the caller,
 /// who frees it with `vg_report_free`; it never changes.
@@ -195,7 +194,7 @@ unsafe impl Versioned for vg_report_figures {
             input_given_psnr_db: 0.0,
             input_given_silhouette_iou: 0.0,
             input_given_mask_covered: 0.0,
-            verdict: vg_verdict::Good as i32,
+            verdict: Verdict::default().number(),
             reason_count: 0,
         }
     }
@@ -203,25 +202,9 @@ unsafe impl Versioned for vg_report_figures {
 
 impl vg_report_figures {
     pub(super) fn of(report: &Report) -> Self {
-        let prior = match report.prior {
-            "given" => vg_prior::Given,
-            "hull" => vg_prior::Hull,
-            "onnx" => vg_prior::Onnx,
-            "shape" => vg_prior::Shape,
-            _ => vg_prior::Auto,
-        };
-        let calibration = match report.calibration.as_ref().map(|c| c.verdict) {
-            None => vg_calibration::None,
-            Some(Verdict::NotNeeded) => vg_calibration::NotNeeded,
-            Some(Verdict::Accepted) => vg_calibration::Accepted,
-            Some(Verdict::Refused) => vg_calibration::Refused,
-        };
-        let verdict = match report.verdict {
-            pipeline::Verdict::Good => vg_verdict::Good,
-            pipeline::Verdict::Unchecked => vg_verdict::Unchecked,
-            pipeline::Verdict::Doubtful => vg_verdict::Doubtful,
-            pipeline::Verdict::Bad => vg_verdict::Bad,
-        };
+        // A baseline has none.
+        let prior = PriorChoice::from_name("prior", report.prior).unwrap_or_default();
+        let calibration = report.calibration.as_ref().map(|c| c.verdict.number());
         let given = report.input_error_by_given_cameras;
         let (low, high) = report.extent_m.unwrap_or_default();
         Self {
@@ -229,7 +212,7 @@ impl vg_report_figures {
             mirrored_count: report.symmetry.cloned as u64,
             views_used: report.views_used.len() as u32,
             threads: report.threads as u32,
-            prior: prior as i32,
+            prior: prior.number(),
             sh_degree: i32::from(report.sh_degree),
             total_ms: report.total_ms,
             peak_rss_bytes: report.peak_rss_bytes.unwrap_or(0),
@@ -243,7 +226,7 @@ impl vg_report_figures {
             relit_count: report.relight.map_or(0, |r| r.clones as u64),
             cloud_used: report.cloud.map_or(0, |c| c.used as u64),
             photo_found: report.photo.map_or(0, |p| p.found as u64),
-            calibration: calibration as i32,
+            calibration: calibration.unwrap_or(vg_calibration::None as i32),
             has_uncovered: i32::from(report.masks.is_some()),
             calibration_yaw_degrees: report.calibration.as_ref().map_or(0.0, |c| c.yaw_degrees),
             calibration_lateral_m: report.calibration.as_ref().map_or(0.0, |c| c.lateral_m),
@@ -259,7 +242,7 @@ impl vg_report_figures {
             input_given_psnr_db: given.map_or(0.0, |e| e.psnr_db),
             input_given_silhouette_iou: given.map_or(0.0, |e| e.silhouette_iou),
             input_given_mask_covered: given.map_or(0.0, |e| e.mask_covered),
-            verdict: verdict as i32,
+            verdict: report.verdict.number(),
             reason_count: report.verdict_reasons.len() as u32,
             ..Self::initial()
         }

@@ -2,7 +2,7 @@
 
 use crate::arrays::{floats, matrix4, owned, rows, shape_text, values, vector};
 use crate::camera::Camera;
-use crate::errors::{bad_value, from_library, renamed};
+use crate::errors::{bad_value, choice, from_library, renamed};
 use crate::reconstruct::mask;
 use crate::watched::watched;
 use crate::whole;
@@ -10,7 +10,7 @@ use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use vg::View;
-use vg::align::{BoxAlignment, Heading, ScanAlignment};
+use vg::align::{BoxAlignment, ScanAlignment};
 use vg::align::{folder_to_scan_watched, to_box_watched, to_scan_watched};
 use vg::geometry::Similarity;
 use vg::scene::Cloud;
@@ -43,7 +43,7 @@ pub(crate) fn align_scan<'py>(
     let points = values(&scan)?.as_chunks::<3>().0.to_vec();
     let views = read_views(py, &masks, &cameras, names)?;
     let sparse = sparse.map_or_else(|| Ok(Vec::new()), |object| rows::<3>(object, "sparse"))?;
-    let heading = read_heading(py, heading)?;
+    let heading = choice(py, "heading", heading)?;
     let found = watched(py, threads, "align", progress, |watch| {
         let scan = Cloud::new(points).map_err(|e| renamed(e, "cloud", "scan"))?;
         to_scan_watched(&views, &sparse.iter().map(|&p| p.into()).collect::<Vec<_>>(), &scan, heading, watch)
@@ -66,7 +66,7 @@ pub(crate) fn align_box<'py>(
 ) -> PyResult<Found<'py>> {
     let views = read_views(py, &masks, &cameras, names)?;
     let (sparse, size) = (rows::<3>(sparse, "sparse")?, vector::<3>(size, "size")?);
-    let heading = read_heading(py, heading)?;
+    let heading = choice(py, "heading", heading)?;
     let BoxAlignment { vehicle_from_world, residual_m, confidence, views, .. } =
         watched(py, threads, "align", progress, |watch| {
             to_box_watched(
@@ -126,7 +126,7 @@ pub(crate) fn align_folder<'py>(
     #[pyo3(from_py_with = whole::threads)] threads: usize,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Found<'py>> {
-    let heading = read_heading(py, heading)?;
+    let heading = choice(py, "heading", heading)?;
     let (_, found) = watched(py, threads, "align", progress, |watch| {
         folder_to_scan_watched(&path, scan.as_deref(), heading, watch)
     })?;
@@ -171,13 +171,4 @@ fn read_views(
         View::without_picture(name, camera, mask).map_err(|e| from_library(py, e))
     };
     cameras.iter().enumerate().map(view).collect()
-}
-
-fn read_heading(py: Python<'_>, name: &str) -> PyResult<Heading> {
-    match name {
-        "auto" => Ok(Heading::Auto),
-        "forward" => Ok(Heading::Forward),
-        "backward" => Ok(Heading::Backward),
-        other => Err(bad_value(py, "heading", &format!("{other:?}"), "auto, forward, backward")),
-    }
 }

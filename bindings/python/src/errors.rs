@@ -8,6 +8,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError};
 /// Numbers of `vehicle_gaussians.Status`.
 pub(crate) use vg::error::Status;
+use vg::geometry::Choice;
 use vg::progress::Threads;
 
 /// Text and place of the last panic, because its payload does not contain the place.
@@ -27,6 +28,11 @@ pub(crate) fn vg_error(py: Python<'_>, status: Status, message: impl Into<String
 /// The error of an argument of the right kind with a value that is not accepted.
 pub(crate) fn bad_value(py: Python<'_>, argument: &str, found: &str, allowed: &str) -> PyErr {
     vg_error(py, Status::Argument, format!("{argument}: {found}; allowed: {allowed}"))
+}
+
+/// Parses a choice by its name; `argument` names it in errors.
+pub(crate) fn choice<T: Choice>(py: Python<'_>, argument: &str, name: &str) -> PyResult<T> {
+    T::from_name(argument, name).map_err(|e| from_library(py, e))
 }
 
 /// The error of an argument of the wrong kind.

@@ -2,9 +2,8 @@
 
 use crate::arrays::{array, borrowed, floats, owned, shape_text, similarity, values, vector};
 use crate::camera::Camera;
-use crate::errors::{bad_type, bad_value, detached, from_library, pooled};
+use crate::errors::{bad_type, bad_value, choice, detached, from_library, pooled};
 use crate::parts;
-use crate::renderer::chosen;
 use crate::watched::watched;
 use crate::whole;
 use numpy::PyUntypedArrayMethods;
@@ -18,12 +17,11 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::PathBuf;
 use std::sync::{Arc, LazyLock};
 use vg::geometry::Turntable;
-use vg::io::ply;
+use vg::io::{ply, splats};
 use vg::progress::Watch;
 use vg::render::backend::{Trainer, trainer};
 use vg::render::{
-    Backend, Background, CpuRenderer, DepthMode, Differentiable, PictureGradient, RenderOptions, Rendered,
-    Renderer,
+    Backend, Background, CpuRenderer, Differentiable, PictureGradient, RenderOptions, Rendered, Renderer,
 };
 
 /// Renderer shared by all calls; it keeps its working memory and the last lens between pictures.
@@ -101,7 +99,7 @@ impl Gaussians {
     #[staticmethod]
     #[pyo3(signature = (path))]
     fn load_ply(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let (inner, _) = pooled(py, 1, || ply::read(&path))?;
+        let (inner, _) = pooled(py, 1, || splats::read(&path))?;
         Ok(Self::new(inner))
     }
 
@@ -111,7 +109,7 @@ impl Gaussians {
     ///     >>> car.save_ply("copy.ply")
     #[pyo3(signature = (path))]
     fn save_ply(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        pooled(py, 1, || ply::write(&path, &self.inner))
+        pooled(py, 1, || splats::write(&path, &self.inner))
     }
 
     /// Reads the bytes of a PLY file in the layout of 3D Gaussian Splatting.
@@ -528,7 +526,7 @@ pub(crate) fn parse_background(object: &Bound<'_, PyAny>) -> PyResult<Background
 
 /// The GPU renderer, if it is requested.
 fn device(py: Python<'_>, backend: &str) -> PyResult<Option<Trainer>> {
-    match chosen(py, "backend", backend)? {
+    match choice(py, "backend", backend)? {
         Backend::Gpu => Ok(Some(detached(py, || trainer(Backend::Gpu))?.0)),
         Backend::Auto | Backend::Cpu => Ok(None),
     }
@@ -541,11 +539,7 @@ fn planes(
     depth_mode: &str,
 ) -> PyResult<RenderOptions> {
     let background = background.map_or(Ok(Background::Color([1.0; 3])), parse_background)?;
-    let depth_mode = match depth_mode {
-        "expected" => DepthMode::Expected,
-        "accumulated" => DepthMode::Accumulated,
-        other => return Err(bad_value(py, "depth_mode", &format!("{other:?}"), "expected, accumulated")),
-    };
+    let depth_mode = choice(py, "depth_mode", depth_mode)?;
     Ok(RenderOptions { background, depth_mode, ..RenderOptions::default() })
 }
 

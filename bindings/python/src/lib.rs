@@ -20,6 +20,7 @@ mod reconstruct;
 mod refine;
 mod renderer;
 mod scene;
+mod settings;
 mod watched;
 mod whole;
 

@@ -10,7 +10,9 @@ use crate::watched::watched;
 use crate::whole;
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
+use std::collections::HashMap;
 use vg::View;
+use vg::geometry::measures::Measure;
 use vg::metrics::{Lpips, SurfaceErrors, SurfaceOptions, ViewErrors, check_colors, psnr, ssim};
 use vg::render::{CpuRenderer, RenderOptions, Renderer};
 
@@ -41,8 +43,12 @@ pub(crate) fn picture_errors(
     })
 }
 
-/// PSNR, PSNR in the box, SSIM, LPIPS, silhouette IoU, mean and 90th percentile of the depth error.
-type OfView = (f64, Option<f64>, Option<f64>, Option<f64>, f64, Option<f64>, Option<f64>);
+/// Measures by their names.
+type ByName = HashMap<&'static str, Option<f64>>;
+
+fn by_name(measures: &[Measure], values: Vec<Option<f64>>) -> ByName {
+    measures.iter().map(|measure| measure.name).zip(values).collect()
+}
 
 #[pyfunction]
 #[pyo3(signature = (gaussians, image, mask, camera, depth, lpips, threads))]
@@ -55,7 +61,7 @@ pub(crate) fn view_errors(
     depth: Option<&Bound<'_, PyAny>>,
     lpips: Option<&Bound<'_, Model>>,
     #[pyo3(from_py_with = whole::threads)] threads: usize,
-) -> PyResult<OfView> {
+) -> PyResult<ByName> {
     let camera = camera.get().inner;
     let (image, cut_out) = picture(image, "image", &camera)?;
     let mask = match mask {
@@ -73,8 +79,9 @@ pub(crate) fn view_errors(
             Some(lpips) => lpips.of(&drawn, &view)?,
             None => None,
         };
-        let e = ViewErrors::of(&drawn, &view);
-        Ok((e.psnr_db, e.psnr_box_db, e.ssim, lpips, e.silhouette_iou, e.depth_mae_m, e.depth_p90_m))
+        let mut errors = by_name(ViewErrors::MEASURES, ViewErrors::of(&drawn, &view).values());
+        errors.insert("lpips", lpips);
+        Ok(errors)
     })
 }
 
@@ -86,7 +93,7 @@ pub(crate) fn surface_errors(
     points: &Bound<'_, PyAny>,
     f_score: f64,
     #[pyo3(from_py_with = whole::threads)] threads: usize,
-) -> PyResult<[f64; 9]> {
+) -> PyResult<ByName> {
     let points = floats(points, "points", "an array of floats, metres, (n, 3)")?;
     if !matches!(points.shape(), [_, 3]) {
         return Err(bad_value(py, "points", &shape_text(points.shape()), "(n, 3)"));
@@ -99,17 +106,7 @@ pub(crate) fn surface_errors(
     let e = watched(py, threads, "measure", None, |watch| {
         SurfaceErrors::watched(gaussians, &points, &options, watch).map_err(|e| renamed(e, "scan", "points"))
     })?;
-    Ok([
-        e.accuracy_m,
-        e.completeness_m,
-        e.chamfer_m,
-        e.precision,
-        e.recall,
-        e.f_score,
-        e.length_error_percent,
-        e.width_error_percent,
-        e.height_error_percent,
-    ])
+    Ok(by_name(SurfaceErrors::MEASURES, e.values()))
 }
 
 /// A picture composited on white, RGB in [0, 1], and its height and width.

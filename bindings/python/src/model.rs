@@ -2,14 +2,14 @@
 
 use crate::arrays::owned;
 use crate::camera::Camera;
-use crate::errors::{bad_value, detached, pooled};
+use crate::errors::{choice, detached, pooled};
 use crate::parts::stays_here;
 use crate::reconstruct::picture;
 use crate::whole;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use std::path::PathBuf;
-use vg::onnx::{ModelOptions, Provider};
+use vg::onnx::ModelOptions;
 use vg::scene::Segmenter;
 use vg::scene::mask::Label;
 
@@ -49,11 +49,7 @@ impl Model {
         prepack: Option<bool>,
         arena: bool,
     ) -> PyResult<Self> {
-        let provider = match provider {
-            "cpu" => Provider::Cpu,
-            "cuda" => Provider::Cuda,
-            other => return Err(bad_value(py, "provider", &format!("{other:?}"), "cpu, cuda")),
-        };
+        let provider = choice(py, "provider", provider)?;
         let options = ModelOptions { runtime, provider, fall_back, threads, prepack, arena };
         let inner = detached(py, || vg::onnx::Model::open(&path, &options))?;
         Ok(Self { inner })

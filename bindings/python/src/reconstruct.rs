@@ -2,23 +2,21 @@
 
 use crate::arrays::{array, floats, owned, shape_text, values, vector};
 use crate::camera::Camera;
-use crate::errors::{bad_type, bad_value, detached, from_library};
+use crate::errors::{bad_type, bad_value, choice, detached, from_library};
 use crate::gaussians::Gaussians;
 use crate::model::Model;
-use crate::renderer::chosen;
+use crate::settings;
 use crate::watched::ProgressFunction;
 use crate::whole;
 use numpy::{PyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::PyFunction;
-use vg::pipeline::{Calibrate, Keep, Options, PriorChoice};
+use pyo3::types::{PyDict, PyFunction};
+use vg::pipeline::Options;
 use vg::progress::Progress;
 use vg::refine::{Amount, RefineOptions};
-use vg::relight::Relight;
 use vg::scene::image::PixelFormat;
 use vg::scene::{Cloud, DepthMap, Mask, Place, RgbImage};
-use vg::symmetry::SymmetryMode;
 use vg::{Scene, View};
 
 /// Positions (n, 3) and colours (n, 3).
@@ -27,10 +25,8 @@ type Points<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u8>>);
 /// The Gaussians, the report as JSON, and the points if requested.
 #[pyfunction]
 #[pyo3(signature = (
-    images, masks, cameras, depths, *, prior, prior_model, head_model, calibrate, symmetry, relight, photo, cloud,
-    vehicle_size, vehicle_place, sh_degree, keep, check, points, budget, resolution, max_views, max_gaussians,
-    refine_iterations,
-    refine_seconds, refine_hold_out, refine_backend, threads, names, progress
+    images, masks, cameras, depths, *, options, prior_model, head_model, cloud, vehicle_size, vehicle_place,
+    refine_iterations, refine_seconds, refine_hold_out, refine_backend, threads, names, progress
 ))]
 pub(crate) fn reconstruct<'py>(
     py: Python<'py>,
@@ -38,24 +34,12 @@ pub(crate) fn reconstruct<'py>(
     masks: Option<Vec<Bound<'py, PyAny>>>,
     cameras: Vec<Bound<'py, PyAny>>,
     depths: Option<Vec<Bound<'py, PyAny>>>,
-    prior: &str,
+    options: &Bound<'py, PyDict>,
     prior_model: Option<Bound<'py, Model>>,
     head_model: Option<Bound<'py, Model>>,
-    calibrate: &str,
-    symmetry: &str,
-    relight: &str,
-    photo: bool,
     cloud: Option<&Bound<'py, PyAny>>,
     vehicle_size: Option<Bound<'py, PyAny>>,
     vehicle_place: Option<Bound<'py, PyAny>>,
-    #[pyo3(from_py_with = whole::sh_degree)] sh_degree: u8,
-    keep: Vec<String>,
-    check: bool,
-    points: bool,
-    budget: Option<f64>,
-    resolution: f64,
-    #[pyo3(from_py_with = whole::max_views)] max_views: Option<usize>,
-    #[pyo3(from_py_with = whole::max_gaussians)] max_gaussians: Option<usize>,
     #[pyo3(from_py_with = whole::refine_iterations)] refine_iterations: Option<u32>,
     refine_seconds: Option<f64>,
     refine_hold_out: bool,
@@ -65,29 +49,16 @@ pub(crate) fn reconstruct<'py>(
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Gaussians, String, Option<Points<'py>>)> {
     let options = Options {
-        prior: parse_prior(py, prior)?,
         prior_model: prior_model.map(|model| model.get().inner.clone()),
         head_model: head_model.map(|model| model.get().inner.clone()),
-        calibrate: parse_calibrate(py, calibrate)?,
-        symmetry: parse_symmetry(py, symmetry)?,
-        relight: parse_relight(py, relight)?,
         vehicle_size: vehicle_size.map(|size| vector::<3>(&size, "vehicle_size")).transpose()?,
         vehicle_place: vehicle_place
             .map(|place| vector::<4>(&place, "vehicle_place"))
             .transpose()?
             .map(|[x, y, z, yaw]| Place { center: [x, y, z], yaw }),
-        sh_degree,
-        keep: parse_keep(py, &keep)?,
-        check,
-        photo,
-        budget_s: budget,
-        resolution,
-        max_views,
-        max_gaussians,
         threads,
-        points,
         refine: refinement(py, refine_iterations, refine_seconds, refine_hold_out, refine_backend)?,
-        ignore_offset: false,
+        ..settings::options(options)?
     };
     // Checked before the pixels are copied.
     options.validate().map_err(|e| from_library(py, e))?;
@@ -123,7 +94,7 @@ fn refinement(
     hold_out: bool,
     backend: &str,
 ) -> PyResult<Option<RefineOptions>> {
-    let backend = chosen(py, "refine_backend", backend)?;
+    let backend = choice(py, "refine_backend", backend)?;
     let amount = match (iterations, seconds) {
         (None, None) => return Ok(None),
         (Some(0), _) => return Err(bad_value(py, "refine_iterations", "0", "1 to 1000000")),
@@ -283,63 +254,4 @@ pub(crate) fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
     static WARN: PyOnceLock<Py<PyFunction>> = PyOnceLock::new();
     WARN.import(py, "vehicle_gaussians._warn", "warn")?.call1((text,))?;
     Ok(())
-}
-
-fn parse_prior(py: Python<'_>, name: &str) -> PyResult<PriorChoice> {
-    match name {
-        "auto" => Ok(PriorChoice::Auto),
-        "given" => Ok(PriorChoice::Given),
-        "hull" => Ok(PriorChoice::Hull),
-        "shape" => Ok(PriorChoice::Shape),
-        "onnx" => Ok(PriorChoice::Onnx),
-        other => Err(bad_value(py, "prior", &format!("{other:?}"), "auto, given, hull, shape, onnx")),
-    }
-}
-
-fn parse_calibrate(py: Python<'_>, name: &str) -> PyResult<Calibrate> {
-    match name {
-        "auto" => Ok(Calibrate::Auto),
-        "off" => Ok(Calibrate::Off),
-        other => Err(bad_value(py, "calibrate", &format!("{other:?}"), "auto, off")),
-    }
-}
-
-fn parse_relight(py: Python<'_>, name: &str) -> PyResult<Relight> {
-    match name {
-        "auto" => Ok(Relight::Auto),
-        "never" => Ok(Relight::Never),
-        other => Err(bad_value(py, "relight", &format!("{other:?}"), "auto, never")),
-    }
-}
-
-fn parse_symmetry(py: Python<'_>, name: &str) -> PyResult<SymmetryMode> {
-    match name {
-        "auto" => Ok(SymmetryMode::Auto),
-        "always" => Ok(SymmetryMode::Always),
-        "never" => Ok(SymmetryMode::Never),
-        "flip" => Ok(SymmetryMode::Flip),
-        other => Err(bad_value(py, "symmetry", &format!("{other:?}"), "auto, always, never, flip")),
-    }
-}
-
-fn parse_keep(py: Python<'_>, names: &[String]) -> PyResult<Keep> {
-    let mut keep = Keep::default();
-    let Keep { duplicate_views, overlap, silhouette_edge, floaters, sh_bands } = &mut keep;
-    for name in names {
-        let all = &mut [&mut *duplicate_views, overlap, silhouette_edge, floaters, sh_bands];
-        let chosen = match name.as_str() {
-            "all" => &mut all[..],
-            "duplicate-views" => &mut all[0..1],
-            "overlap" => &mut all[1..2],
-            "silhouette-edge" => &mut all[2..3],
-            "floaters" => &mut all[3..4],
-            "sh-bands" => &mut all[4..5],
-            other => {
-                let allowed = "duplicate-views, overlap, silhouette-edge, floaters, sh-bands, all";
-                return Err(bad_value(py, "keep", &format!("{other:?}"), allowed));
-            }
-        };
-        chosen.iter_mut().for_each(|flag| **flag = true);
-    }
-    Ok(keep)
 }

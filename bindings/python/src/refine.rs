@@ -1,9 +1,8 @@
 //! Optimisation of existing Gaussians against photographs.
 
-use crate::errors::{bad_value, detached, from_library};
+use crate::errors::{bad_value, choice, detached, from_library};
 use crate::gaussians::Gaussians;
 use crate::reconstruct::read_scene;
-use crate::renderer::chosen;
 use crate::watched::ProgressFunction;
 use crate::whole;
 use pyo3::prelude::*;
@@ -42,7 +41,7 @@ pub(crate) fn refine(
         }
     };
     let densify = densify.then(Densify::for_refinement);
-    let backend = chosen(py, "backend", backend)?;
+    let backend = choice(py, "backend", backend)?;
     let options = RefineOptions { amount, hold_out, densify, backend, ..RefineOptions::default() };
     let named = |error| match error {
         vg::Error::Argument { argument, found, allowed } => {

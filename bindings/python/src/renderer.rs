@@ -1,7 +1,7 @@
 //! `Renderer`: Gaussians prepared for rendering many times, on the CPU or a GPU.
 
 use crate::camera::Camera;
-use crate::errors::{bad_value, detached};
+use crate::errors::{choice, detached};
 use crate::gaussians::{Gaussians, parse_background, picture};
 use crate::parts::stays_here;
 use crate::watched::watched;
@@ -27,7 +27,7 @@ impl Renderer {
     #[pyo3(signature = (gaussians, backend="auto"))]
     fn new(gaussians: &Bound<'_, Gaussians>, backend: &str) -> PyResult<Self> {
         let py = gaussians.py();
-        let backend = chosen(py, "backend", backend)?;
+        let backend = choice(py, "backend", backend)?;
         let shared = Arc::clone(&gaussians.get().inner);
         Ok(Self { ready: detached(py, || AssetRenderer::new(shared, backend))? })
     }
@@ -136,15 +136,5 @@ fn array<'py>(
     match options.background {
         Background::Color(_) => picture(py, size, pixels.iter().map(rgb).collect()),
         Background::Transparent => picture(py, size, pixels),
-    }
-}
-
-/// Parses a choice of renderer; `argument` names it in errors.
-pub(crate) fn chosen(py: Python<'_>, argument: &str, backend: &str) -> PyResult<Backend> {
-    match backend {
-        "auto" => Ok(Backend::Auto),
-        "cpu" => Ok(Backend::Cpu),
-        "gpu" => Ok(Backend::Gpu),
-        other => Err(bad_value(py, argument, &format!("{other:?}"), "auto, cpu, gpu")),
     }
 }

@@ -43,16 +43,6 @@ pub(crate) fn iterations(object: &Bound<'_, PyAny>) -> PyResult<Option<u32>> {
     given(object, |object| whole(object, "iterations", "1 to 1000000"))
 }
 
-/// `max_gaussians`, or None.
-pub(crate) fn max_gaussians(object: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
-    given(object, |object| whole(object, "max_gaussians", "at least 1"))
-}
-
-/// `max_views`, or None.
-pub(crate) fn max_views(object: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
-    given(object, |object| whole(object, "max_views", "at least 1"))
-}
-
 /// `refine_iterations`, or None.
 pub(crate) fn refine_iterations(object: &Bound<'_, PyAny>) -> PyResult<Option<u32>> {
     given(object, |object| whole(object, "refine_iterations", "1 to 1000000"))
@@ -65,7 +55,12 @@ fn given<'py, T>(
     if object.is_none() { Ok(None) } else { parse(object).map(Some) }
 }
 
-fn whole<T: TryFrom<u64>>(object: &Bound<'_, PyAny>, argument: &str, allowed: &str) -> PyResult<T> {
+/// A whole number of any argument.
+pub(crate) fn whole<T: TryFrom<u64>>(
+    object: &Bound<'_, PyAny>,
+    argument: &str,
+    allowed: &str,
+) -> PyResult<T> {
     if let Some(number) = object.extract::<u64>().ok().and_then(|number| T::try_from(number).ok()) {
         return Ok(number);
     }

@@ -76,7 +76,7 @@ fn by_masks(path: &Path, scan: Option<&Path>, heading: Heading) -> Result<(Maske
 }
 
 fn by_scan(args: &AlignArgs, path: &Path) -> Result<Found> {
-    let (scene, found) = by_masks(&args.scene, Some(path), args.heading())?;
+    let (scene, found) = by_masks(&args.scene, Some(path), args.heading)?;
     let mut lines = vec![masks_line(found.views, &scene)];
     lines.push(format!(
         "outlines differ by {:.2} pixels on average, with front and rear swapped by {:.2}",
@@ -90,7 +90,7 @@ fn by_scan(args: &AlignArgs, path: &Path) -> Result<Found> {
 
 fn by_box(args: &AlignArgs, size: [f64; 3]) -> Result<Found> {
     let scene = masks_of(&args.scene)?;
-    let found = to_box(&scene.views, &scene.points, size, args.heading());
+    let found = to_box(&scene.views, &scene.points, size, args.heading);
     let found = found.map_err(|e| named(e, &args.scene, None))?;
     let [l, w, h] = found.found_m;
     let lines = vec![

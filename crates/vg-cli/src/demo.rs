@@ -10,7 +10,7 @@ use crate::job::{Failure, Outcome, Result};
 use crate::{files, reconstruct, render, sample, scene, shown};
 use std::path::{Path, PathBuf};
 use vg::View;
-use vg::io::{SceneOptions, ply};
+use vg::io::{SceneOptions, ply, splats};
 use vg::pipeline::{Options, PriorChoice};
 use vg::progress::Threads;
 use vg::render::{RenderOptions, Rendered};
@@ -42,7 +42,7 @@ pub(crate) fn run(args: &DemoArgs) -> Result {
     let tests = scene::open(&scene_folder, &split.test, &without_depth, &threads)?;
     let (drawn, mut measured) = measure::judge(&made.gaussians, &tests.scene.views, &threads)?;
     measured.reconstruct_ms = Some(made.report.total_ms);
-    ply::write(&asset, &made.gaussians)?;
+    splats::write(&asset, &made.gaussians)?;
     if let Some(cloud) = &made.points {
         ply::write_points(&points, &cloud.positions, &cloud.colors)?;
     }

@@ -5,10 +5,13 @@ use crate::job::{Failure, Outcome, Result, USAGE};
 use crate::shown;
 use std::io::{BufWriter, ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
+use vg::io::splats;
 
 /// Format of a file, which the extension of its name must not contradict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
+    /// A model, in any format of [`splats::FORMATS`].
+    Model,
     Ply,
     Json,
     Csv,
@@ -19,8 +22,12 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    fn name(self) -> &'static str {
-        match self {
+    fn name(self) -> String {
+        let name = match self {
+            Self::Model => {
+                let names: Vec<&str> = splats::FORMATS.iter().map(|format| format.name).collect();
+                return format!("a {} file", names.join(" or "));
+            }
             Self::Ply => "a PLY file",
             Self::Json => "JSON",
             Self::Csv => "CSV",
@@ -28,11 +35,15 @@ impl Kind {
             Self::Html => "HTML",
             Self::Svg => "SVG",
             Self::Png => "a PNG picture",
-        }
+        };
+        name.to_owned()
     }
 
-    fn endings(self) -> &'static [&'static str] {
-        match self {
+    fn endings(self) -> Vec<&'static str> {
+        let endings: &[&str] = match self {
+            Self::Model => {
+                return splats::FORMATS.iter().flat_map(|format| format.endings).copied().collect();
+            }
             Self::Ply => &["ply"],
             Self::Json => &["json"],
             Self::Csv => &["csv"],
@@ -40,11 +51,12 @@ impl Kind {
             Self::Html => &["html", "htm"],
             Self::Svg => &["svg"],
             Self::Png => &["png"],
-        }
+        };
+        endings.to_vec()
     }
 
     fn is_text(self) -> bool {
-        !matches!(self, Self::Ply | Self::Png)
+        !matches!(self, Self::Model | Self::Ply | Self::Png)
     }
 
     /// Refuses an extension of another format. A name without extension, a device or a pipe is accepted.
@@ -166,7 +178,7 @@ mod tests {
     #[test]
     fn an_extension_of_another_format_is_refused_and_a_missing_one_is_not() {
         for (kind, name) in [
-            (Kind::Ply, "car.spz"),
+            (Kind::Model, "car.spz"),
             (Kind::Ply, "car.ply.gz"),
             (Kind::Png, "plot.jpg"),
             (Kind::Json, "r.txt"),
@@ -176,7 +188,7 @@ mod tests {
             assert!(failure.code == USAGE && failure.message.contains("expected a name that ends in ."));
         }
         for (kind, name) in
-            [(Kind::Ply, "CAR.PLY"), (Kind::Ply, "car"), (Kind::Html, "a.b.htm"), (Kind::Csv, "-")]
+            [(Kind::Model, "CAR.PLY"), (Kind::Ply, "car"), (Kind::Html, "a.b.htm"), (Kind::Csv, "-")]
         {
             assert!(kind.check_name(Path::new(name)).is_ok(), "{name}");
         }

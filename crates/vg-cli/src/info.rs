@@ -6,7 +6,8 @@ use crate::job::{Outcome, Result};
 use crate::shown;
 use std::fmt::Write;
 use vg::Gaussians;
-use vg::io::ply::{self, Content, OtherGaussians, PlyNotes};
+use vg::io::ply::{Content, OtherGaussians, PlyNotes};
+use vg::io::splats;
 use vg::render::options::ALPHA_THRESHOLD;
 
 /// Largest side of a vehicle, metres, as `--box` accepts it.
@@ -29,7 +30,7 @@ const FEW: usize = 100;
 
 /// Describes Gaussians, Gaussians of a kind that is not rendered, or coloured points.
 pub(crate) fn run(args: &InfoArgs) -> Result {
-    Ok(Outcome::done(match ply::read_content(files::input(&args.file))? {
+    Ok(Outcome::done(match splats::read_content(files::input(&args.file))? {
         Content::Gaussians(gaussians, notes) => describe_gaussians(&gaussians, &notes),
         Content::Others(others) => describe_others(&others),
         Content::Points((positions, _)) => describe_points(&positions),

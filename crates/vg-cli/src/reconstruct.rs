@@ -7,7 +7,7 @@ use crate::job::{Failure, Outcome, Result, note};
 use crate::shown::Bar;
 use crate::{cloud, files, interrupt, scene, shown};
 use std::path::Path;
-use vg::io::{ply, vehicle_frame};
+use vg::io::{ply, splats, vehicle_frame};
 use vg::onnx::Model;
 use vg::pipeline::{self, CheckedView, InputError, Method, Reconstruction, Report, Verdict};
 use vg::progress::Threads;
@@ -27,7 +27,7 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
     }
     let index = io::list_scene(&args.scene, &scene::named(args.views.names().as_deref(), &options))?;
     let results = Results::new([
-        (Kind::Ply, Some(&args.output)),
+        (Kind::Model, Some(&args.output)),
         (Kind::Ply, args.points.as_ref()),
         (Kind::Json, args.report.as_ref()),
     ]);
@@ -47,7 +47,7 @@ pub(crate) fn run(args: &ReconstructArgs) -> Result {
     let made = reconstruct(&opened.scene, &method, &threads)?;
     note_warnings(&made.report);
     accept(&made.report, &args.strict)?;
-    files::write(&args.output, |out| ply::write_to(out, &made.gaussians))?;
+    files::write(&args.output, |out| splats::write_to(out, &args.output, &made.gaussians))?;
     if let (Some(path), Some(cloud)) = (&args.points, &made.points) {
         files::write(path, |out| ply::write_points_to(out, &cloud.positions, &cloud.colors))?;
     }

@@ -7,7 +7,7 @@ use crate::job::{self, Failure, Outcome, Result};
 use crate::shown::{self, Bar};
 use crate::{files, info, scene};
 use serde::Serialize;
-use vg::io::{self, ply};
+use vg::io::{self, splats};
 use vg::progress::Threads;
 use vg::refine::{self, Densify, RefineOptions, Refinement, Stop};
 
@@ -23,11 +23,11 @@ struct Document<'a> {
 pub(crate) fn run(args: &RefineArgs) -> Result {
     let options = scene::options(&args.frame, None, false)?;
     let index = io::list_scene(&args.scene, &scene::named(args.views.names().as_deref(), &options))?;
-    let results = Results::new([(Kind::Ply, Some(&args.output)), (Kind::Json, args.report.as_ref())]);
+    let results = Results::new([(Kind::Model, Some(&args.output)), (Kind::Json, args.report.as_ref())]);
     let inputs = Inputs::default().files(&scene::view_files(&index)).files([&args.asset]);
     results.prepare(&inputs.files(&args.frame.vehicle_from_world).scene(&args.scene))?;
 
-    let (gaussians, _) = ply::read(files::input(&args.asset))?;
+    let (gaussians, _) = splats::read(files::input(&args.asset))?;
     info::linear_numbers(&gaussians).iter().for_each(|sign| job::note(sign));
     if gaussians.is_empty() {
         return Err(Failure::job(format!("{}: no Gaussians to refine", args.asset.display())));
@@ -50,7 +50,7 @@ pub(crate) fn run(args: &RefineArgs) -> Result {
         Stop::Diverged => job::note("the error grew, so the best earlier state of the model is written"),
         Stop::Done | Stop::HeldOut => {}
     }
-    files::write(&args.output, |out| ply::write_to(out, &refined))?;
+    files::write(&args.output, |out| splats::write_to(out, &args.output, &refined))?;
     if let Some(path) = &args.report {
         let version = env!("CARGO_PKG_VERSION");
         files::write_json(path, &Document { version, settings: &settings, refinement: &done })?;

@@ -10,14 +10,14 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use vg::geometry::Turntable;
-use vg::io::{self, NamedCamera, image, ply};
+use vg::io::{self, NamedCamera, image, splats};
 use vg::progress::Threads;
 use vg::render::{AssetRenderer, Background, RenderOptions, Rendered, Rgba8};
 use vg::{Camera, Gaussians};
 
 /// Reads the model and renders it from every camera.
 pub(crate) fn run(args: &RenderArgs) -> Result {
-    let (gaussians, _) = ply::read(files::input(&args.asset))?;
+    let (gaussians, _) = splats::read(files::input(&args.asset))?;
     info::linear_numbers(&gaussians).iter().for_each(|sign| job::note(sign));
     let mut inputs = Inputs::default().files([&args.asset]).files(&args.frame.vehicle_from_world);
     let cameras = match (&args.cameras, args.turntable) {

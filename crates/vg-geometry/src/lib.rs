@@ -10,11 +10,14 @@
 
 pub mod align;
 pub mod camera;
+pub mod choice;
 pub mod descent;
 pub mod distortion;
 pub mod error;
 pub mod frame;
+pub mod measures;
 pub mod nearest;
+pub mod options;
 mod pixels;
 mod placed;
 pub mod pose;
@@ -26,6 +29,7 @@ pub mod unfolded;
 
 pub use align::Similarity;
 pub use camera::{Camera, CameraModel, Intrinsics, OpenCvModel};
+pub use choice::Choice;
 pub use distortion::Distortion;
 pub use error::{Error, Result};
 pub use pixels::PixelAndDepth;

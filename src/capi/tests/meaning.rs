@@ -12,10 +12,12 @@ use std::ops::ControlFlow;
 use std::sync::OnceLock;
 use vg::Error;
 use vg::calibrate::Verdict;
+use vg::geometry::Choice;
 use vg::geometry::camera::CameraModel;
+use vg::geometry::options::{self, Face, Field, Kind};
 use vg::io::{SceneOptions, open_scene};
 use vg::onnx::ModelOptions;
-use vg::pipeline::{self, InputError, Options, PriorChoice, Reason, ReasonCode, Report, Severity};
+use vg::pipeline::{self, InputError, KeepItem, Options, PriorChoice, Reason, ReasonCode, Report, Severity};
 use vg::refine::{Amount, RefineOptions, Refinement, Stop};
 use vg::relight::Relighting;
 use vg::render::{Background, RenderOptions};
@@ -73,13 +75,7 @@ fn each_option_of_a_reconstruction_sets_its_namesake() {
         (options.vehicle_size, options.has_vehicle_place) = ([4.5, 1.75, 1.5], 1);
         options
     }
-    let effects: [Set<vg_options, Options>; 21] = [
-        ("prior", |o| o.prior = vg_prior::Hull as i32, |r| r.prior == PriorChoice::Hull),
-        ("symmetry", |o| o.symmetry = vg_symmetry::Never as i32, |r| format!("{:?}", r.symmetry) == "Never"),
-        ("sh_degree", |o| o.sh_degree = 1, |r| r.sh_degree == 1),
-        ("keep", |o| o.keep = vg_keep::Floaters as u32, |r| r.keep.floaters),
-        ("check", |o| o.check = 0, |r| !r.check),
-        ("points", |o| o.points = 1, |r| r.points),
+    let effects: [Set<vg_options, Options>; 8] = [
         ("vehicle_size", |o| o.vehicle_size = [4.5, 1.75, 1.5], |r| r.vehicle_size == Some([4.5, 1.75, 1.5])),
         (
             "vehicle_center",
@@ -88,13 +84,6 @@ fn each_option_of_a_reconstruction_sets_its_namesake() {
         ),
         ("vehicle_yaw", |o| place(o).vehicle_yaw = 0.25, |r| r.vehicle_place.is_some_and(|p| p.yaw == 0.25)),
         ("has_vehicle_place", |o| place(o).vehicle_flags = 0, |r| r.vehicle_place.is_some()),
-        ("calibrate", |o| o.calibrate = vg_calibrate::Off as i32, |r| format!("{:?}", r.calibrate) == "Off"),
-        ("relight", |o| o.relight = vg_relight::Never as i32, |r| format!("{:?}", r.relight) == "Never"),
-        ("photo", |o| o.photo = 0, |r| !r.photo),
-        ("budget_s", |o| o.budget_s = 2.5, |r| r.budget_s == Some(2.5)),
-        ("resolution", |o| o.resolution = 0.5, |r| r.resolution == 0.5),
-        ("max_gaussians", |o| o.max_gaussians = 7, |r| r.max_gaussians == Some(7)),
-        ("max_views", |o| o.max_views = 3, |r| r.max_views == Some(3)),
         (
             "refine_seconds",
             |o| o.refine_seconds = 1.5,
@@ -116,7 +105,7 @@ fn each_option_of_a_reconstruction_sets_its_namesake() {
             |r| format!("{:?}", refinement(r).backend) == "Cpu",
         ),
     ];
-    // `cloud` is tested below, callbacks by the client of each release, and models by the tests of networks.
+    // Options of the table are in the next test; `cloud` is below; callbacks are called by the client of each release, models by the tests of networks.
     let elsewhere = [
         "struct_size",
         "context",
@@ -133,6 +122,8 @@ fn each_option_of_a_reconstruction_sets_its_namesake() {
         "vehicle_flags",
         "progress_overall",
     ];
+    let table = options_of_the_table();
+    let elsewhere: Vec<&str> = elsewhere.into_iter().chain(table.iter().map(|field| field.name)).collect();
     let read = |options: &vg_options| unsafe { options.to_options() };
     assert_effects("vg_options", vg_options::initial(), read, &effects, &elsewhere);
     assert_eq!(read(&vg_options::initial()).unwrap(), Options::default(), "the defaults are Rust's");
@@ -140,6 +131,71 @@ fn each_option_of_a_reconstruction_sets_its_namesake() {
     let points = [[1.0f32, 2.0, 3.0], [4.0, 5.0, 6.0]];
     let options = vg_options { cloud: points.as_ptr().cast(), cloud_count: 2, ..vg_options::initial() };
     assert_eq!(unsafe { options.to_cloud() }.unwrap().unwrap().points(), points);
+}
+
+/// Options that C has from the library's table.
+fn options_of_the_table() -> Vec<Field> {
+    let fields = Options::fields().into_iter();
+    fields.filter(|field| !field.facts.apart.contains(&Face::C)).collect()
+}
+
+/// Values other than the default, each with its bytes in C: all names, and a number that no other option gets.
+fn others(field: &Field, i: u8) -> Vec<(options::Value, Vec<u8>)> {
+    use options::Value;
+    let int = |number: i32| number.to_ne_bytes().to_vec();
+    match field.kind {
+        Kind::Choice(e) => {
+            let others = e().variants.into_iter().map(|v| (Value::Name(v.name.into()), int(v.number)));
+            others.filter(|other| other.0 != field.default).collect()
+        }
+        Kind::Set(e) => {
+            e().variants.iter().map(|v| (Value::Names(vec![v.name.into()]), int(v.number))).collect()
+        }
+        Kind::Flag => {
+            let other = field.default == Value::Flag(false);
+            vec![(Value::Flag(other), int(other.into()))]
+        }
+        Kind::Whole => {
+            (0..=3u64).map(|n| (Value::Whole(n), int(n as i32))).filter(|o| o.0 != field.default).collect()
+        }
+        Kind::MaybeWhole => {
+            let number = 100 + usize::from(i);
+            vec![(Value::Whole(number as u64), number.to_ne_bytes().to_vec())]
+        }
+        Kind::Real | Kind::MaybeReal => {
+            let number = 0.25 + f64::from(i) / 256.0;
+            vec![(Value::Real(number), number.to_ne_bytes().to_vec())]
+        }
+    }
+}
+
+/// A field of C, found by the golden layout, sets the option of its name to the same value, and no other option.
+#[test]
+fn each_option_of_the_table_sets_its_namesake_and_nothing_else() {
+    let (table, layout) = (options_of_the_table(), golden_layout());
+    for (i, field) in table.iter().enumerate() {
+        let line =
+            layout.lines().find_map(|line| line.strip_prefix(&format!("vg_options.{} at ", field.name)));
+        let (at, size) = line.and_then(|line| line.split_once(" size ")).expect("a line of the layout");
+        for (value, bytes) in others(field, i as u8) {
+            assert_eq!(bytes.len().to_string(), size, "{}", field.name);
+            let mut options = vg_options::initial();
+            let at = (&raw mut options).cast::<u8>().wrapping_add(at.parse().unwrap());
+            unsafe { std::ptr::copy_nonoverlapping(bytes.as_ptr(), at, bytes.len()) };
+            let read = unsafe { options.to_options() }.unwrap();
+            for other in &table {
+                let expected = if other.name == field.name { &value } else { &other.default };
+                assert_eq!(
+                    read.get(other.name).as_ref(),
+                    Some(expected),
+                    "{} sets {}",
+                    field.name,
+                    other.name
+                );
+            }
+        }
+    }
+    assert!(table.len() >= 13);
 }
 
 #[test]
@@ -410,6 +466,17 @@ fn each_figure_of_a_report_is_rusts_number_and_the_jsons() {
 struct CheckedEnumerators(BTreeSet<String>);
 
 impl CheckedEnumerators {
+    /// Every variant of an enumeration that C shares with the library, and what Rust makes of its number.
+    #[track_caller]
+    fn all<T: Choice + Debug>(&mut self, enumeration: &str, rust: impl Fn(i32) -> T) {
+        let numbers = numbers_of_rust();
+        for variant in T::ALL.iter().map(|choice| choice.variant()) {
+            let line = format!("{} = {}", enumerator(enumeration, variant.ident), variant.number);
+            assert!(numbers.contains(&line), "C has no {line}");
+            self.check(enumeration, format_args!("{}", variant.ident), rust(variant.number));
+        }
+    }
+
     /// Checks that `variant` of an enumeration of C becomes the variant of Rust with the same name, ignoring case.
     #[track_caller]
     fn check(&mut self, enumeration: &str, variant: impl Debug, rust: impl Debug) {
@@ -430,31 +497,15 @@ fn each_enumerator_means_its_namesake_in_rust() {
         set(&mut options);
         unsafe { options.to_options() }.unwrap()
     };
-    for prior in [vg_prior::Auto, vg_prior::Given, vg_prior::Hull, vg_prior::Onnx, vg_prior::Shape] {
-        checked.check("vg_prior", prior, options(&|o| o.prior = prior as i32).prior);
-        if prior != vg_prior::Auto {
-            let name = format!("{prior:?}").to_lowercase();
-            let report = Report { prior: Box::leak(name.into_boxed_str()), ..report() };
-            assert_eq!(vg_report_figures::of(&report).prior, prior as i32);
-        }
+    checked.all("vg_prior", |n| options(&|o| o.prior = n).prior);
+    for prior in PriorChoice::ALL.iter().filter(|prior| **prior != PriorChoice::Auto) {
+        assert_eq!(vg_report_figures::of(&Report { prior: prior.name(), ..report() }).prior, prior.number());
     }
-    for symmetry in [vg_symmetry::Auto, vg_symmetry::Always, vg_symmetry::Never, vg_symmetry::Flip] {
-        checked.check("vg_symmetry", symmetry, options(&|o| o.symmetry = symmetry as i32).symmetry);
-    }
-    for calibrate in [vg_calibrate::Auto, vg_calibrate::Off] {
-        checked.check("vg_calibrate", calibrate, options(&|o| o.calibrate = calibrate as i32).calibrate);
-    }
-    for relight in [vg_relight::Auto, vg_relight::Never] {
-        checked.check("vg_relight", relight, options(&|o| o.relight = relight as i32).relight);
-    }
-    for bit in [
-        vg_keep::DuplicateViews,
-        vg_keep::Overlap,
-        vg_keep::SilhouetteEdge,
-        vg_keep::Floaters,
-        vg_keep::ShBands,
-    ] {
-        let keep = serde_json::to_value(options(&|o| o.keep = bit as u32).keep).unwrap();
+    checked.all("vg_symmetry", |n| options(&|o| o.symmetry = n).symmetry);
+    checked.all("vg_calibrate", |n| options(&|o| o.calibrate = n).calibrate);
+    checked.all("vg_relight", |n| options(&|o| o.relight = n).relight);
+    for bit in KeepItem::ALL {
+        let keep = serde_json::to_value(options(&|o| o.keep = bit.number() as u32).keep).unwrap();
         let kept: Vec<&String> = keep
             .as_object()
             .unwrap()
@@ -508,9 +559,7 @@ fn each_enumerator_means_its_namesake_in_rust() {
     for alpha in [vg_alpha::Straight, vg_alpha::Premultiplied] {
         checked.check("vg_alpha", alpha, drawing(&|o| o.alpha = alpha as i32).1);
     }
-    for mode in [vg_depth_mode::Expected, vg_depth_mode::Accumulated] {
-        checked.check("vg_depth_mode", mode, drawing(&|o| o.depth_mode = mode as i32).0.depth_mode);
-    }
+    checked.all("vg_depth_mode", |n| drawing(&|o| o.depth_mode = n).0.depth_mode);
     for backend in [vg_backend::Auto, vg_backend::Cpu, vg_backend::Gpu] {
         match render::backend("backend", backend as i32) {
             Ok(rust) => checked.check("vg_backend", backend, rust),
@@ -520,10 +569,9 @@ fn each_enumerator_means_its_namesake_in_rust() {
             Err(other) => panic!("{other}"),
         }
     }
-    for heading in [vg_heading::Auto, vg_heading::Forward, vg_heading::Backward] {
-        let options = vg_align_options { heading: heading as i32, ..vg_align_options::initial() };
-        checked.check("vg_heading", heading, options.heading().unwrap());
-    }
+    checked.all("vg_heading", |n| {
+        vg_align_options { heading: n, ..vg_align_options::initial() }.heading().unwrap()
+    });
     for model in CameraModel::ALL {
         let named = [
             vg_camera_model::SimplePinhole,
@@ -542,9 +590,7 @@ fn each_enumerator_means_its_namesake_in_rust() {
         set(&mut options);
         unsafe { options.read() }.unwrap()
     };
-    for provider in [vg_provider::Cpu, vg_provider::Cuda] {
-        checked.check("vg_provider", provider, opening(&|o| o.provider = provider as i32).provider);
-    }
+    checked.all("vg_provider", |n| opening(&|o| o.provider = n).provider);
     for (prepack, rust) in
         [(vg_prepack::Auto, None), (vg_prepack::Always, Some(true)), (vg_prepack::Never, Some(false))]
     {

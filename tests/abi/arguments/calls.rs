@@ -9,7 +9,11 @@ use std::ffi::{CStr, CString, c_void};
 use std::mem::offset_of;
 use std::path::{Path, PathBuf};
 use std::ptr::{null, null_mut};
+use vg::geometry::choice::Enumeration;
+use vg::geometry::options::{Face, Field as TableField, Kind, Value as OptionValue};
+use vg::pipeline::Options;
 use vg_face::capi::*;
+use vg_testing::tools::golden;
 use vg_testing::vehicle;
 
 /// The byte that fills guards and gaps.
@@ -1538,6 +1542,54 @@ fn priors() -> Tries {
     }
 }
 
+/// Options that C has from the library's table.
+fn table() -> Vec<TableField> {
+    Options::fields().into_iter().filter(|option| !option.facts.apart.contains(&Face::C)).collect()
+}
+
+/// The default of an option as C has it.
+fn bits_of(option: &TableField) -> u64 {
+    let number_of = |name: &str, e: fn() -> Enumeration| {
+        e().variants.iter().find(|variant| variant.name == name).expect("a variant").number as u64
+    };
+    match (&option.default, option.kind) {
+        (OptionValue::Flag(yes), _) => u64::from(*yes),
+        (OptionValue::Whole(number), _) => *number,
+        (OptionValue::Real(number), _) => number.to_bits(),
+        (OptionValue::Name(name), Kind::Choice(e)) => number_of(name, e),
+        (OptionValue::Names(names), Kind::Set(e)) => names.iter().map(|name| number_of(name, e)).sum(),
+        _ => 0,
+    }
+}
+
+/// Options of the table that are not named here: what their kind and range allow, where the golden layout has them.
+fn newer_options(known: &[Field]) -> Vec<Field> {
+    let layout = std::fs::read_to_string(golden().join("layout_x86_64.txt")).unwrap();
+    let place = |name: &str| -> (usize, usize) {
+        let line = layout.lines().find_map(|line| line.strip_prefix(&format!("vg_options.{name} at ")));
+        let (at, size) = line.and_then(|line| line.split_once(" size ")).expect("a field of vg_options");
+        (at.parse().unwrap(), size.parse().unwrap())
+    };
+    let newer = table().into_iter().filter(|option| known.iter().all(|field| field.name != option.name));
+    newer
+        .map(|option| {
+            let (offset, size) = place(option.name);
+            let numbers =
+                |e: fn() -> Enumeration| e().variants.iter().map(|v| v.number).collect::<Vec<i32>>();
+            let tries = match option.kind {
+                Kind::Flag => choice(&[0, 1]),
+                Kind::Choice(e) => choice(&numbers(e)),
+                Kind::Set(e) => {
+                    vec![(numbers(e).iter().sum::<i32>() as u64, Fine), (u64::from(u32::MAX), Refused)]
+                }
+                Kind::Whole | Kind::MaybeWhole => vec![(bits_of(&option), Fine)],
+                Kind::Real | Kind::MaybeReal => vec![(bits_of(&option), Fine), (f64::NAN.to_bits(), Refused)],
+            };
+            Field { name: option.name.into(), word: option.name.into(), offset, size, count: 1, tries }
+        })
+        .collect()
+}
+
 fn options(context: usize) -> Lent {
     let fields = fields!(vg_options {
         struct_size: elsewhere(),
@@ -1576,12 +1628,15 @@ fn options(context: usize) -> Lent {
         progress_overall: elsewhere(),
         max_gaussians: [0, 100_000, 1 << 60, u64::MAX].map(|n| (n, Fine)).to_vec(),
     });
-    let mut lent = Lent::zeroed::<vg_options>("vg_options", fields);
+    let newer = newer_options(&fields);
+    let mut lent = Lent::zeroed::<vg_options>("vg_options", [fields, newer].concat());
     lent.put("context", 0, context as u64);
-    lent.put("sh_degree", 0, 2);
-    lent.put("check", 0, 1);
-    lent.put("photo", 0, 1);
-    lent.put("resolution", 0, 1f64.to_bits());
+    for option in table() {
+        // Any number of Gaussians.
+        if option.name != "max_gaussians" {
+            lent.put(option.name, 0, bits_of(&option));
+        }
+    }
     for (i, metres) in [4.4f64, 1.8, 1.4].into_iter().enumerate() {
         lent.put("vehicle_size", i, metres.to_bits());
     }

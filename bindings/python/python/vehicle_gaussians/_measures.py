@@ -24,7 +24,7 @@ class ViewErrors(NamedTuple):
     """The error of a model in one photograph; None where a measure is not defined."""
 
     psnr_db: float
-    """Peak signal-to-noise ratio over the full frame, dB."""
+    """Peak signal-to-noise ratio over the full frame, dB; infinite for equal pictures."""
     psnr_box_db: float | None
     """Peak signal-to-noise ratio inside the bounding box of the mask, dB; None where the mask is empty."""
     ssim: float | None
@@ -32,9 +32,10 @@ class ViewErrors(NamedTuple):
     lpips: float | None
     """Perceptual distance LPIPS; None without a model for it, and for a picture smaller than 64x64."""
     silhouette_iou: float
-    """Intersection over union of the mask and the pixels that the model covers by half or more."""
+    """Intersection over union of the mask and the pixels that the model covers by half or more, 0 to 1."""
     depth_mae_m: float | None
-    """Mean absolute difference of depth, metres; None without depth."""
+    """Mean absolute difference of depth where the view has depth and the model covers the pixel by half or more,
+    metres; None where that is nowhere."""
     depth_p90_m: float | None
     """90th percentile of that difference, metres."""
 
@@ -50,14 +51,14 @@ class SurfaceErrors(NamedTuple):
     chamfer_m: float
     """Mean of accuracy_m and completeness_m."""
     precision: float
-    """Fraction of the model's surface that is nearer to the scan than the threshold."""
+    """Share of the model's surface that is nearer to the scan than f_score."""
     recall: float
-    """Fraction of the scan that is nearer to the model's surface than the threshold."""
+    """Share of the scan that is nearer to the model's surface than f_score."""
     f_score: float
     """Harmonic mean of precision and recall."""
     length_error_percent: float
     """Error of the model's length (x) against the scan, percent; negative: shorter."""
     width_error_percent: float
-    """Error of its width (y), percent."""
+    """The same of the width (y)."""
     height_error_percent: float
-    """Error of its height (z), percent."""
+    """The same of the height (z)."""

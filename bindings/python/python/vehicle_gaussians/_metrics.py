@@ -54,7 +54,8 @@ def view_errors(
     >>> view_errors(car, image, mask, camera).silhouette_iou > 0.8
     True
     """
-    return ViewErrors(*_native.view_errors(gaussians, image, mask, camera, depth, lpips, threads))
+    errors = _native.view_errors(gaussians, image, mask, camera, depth, lpips, threads)
+    return ViewErrors(**errors)  # type: ignore[arg-type]
 
 
 def surface_errors(gaussians: Gaussians, points: Floats, *, f_score: float = 0.05, threads: int = 0) -> SurfaceErrors:
@@ -65,4 +66,5 @@ def surface_errors(gaussians: Gaussians, points: Floats, *, f_score: float = 0.0
     >>> surface_errors(car, scan).accuracy_m < 0.1
     True
     """
-    return SurfaceErrors(*_native.surface_errors(gaussians, points, f_score, threads))
+    errors = _native.surface_errors(gaussians, points, f_score, threads)
+    return SurfaceErrors(**errors)  # type: ignore[arg-type]

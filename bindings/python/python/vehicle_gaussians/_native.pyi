@@ -1,4 +1,4 @@
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, SupportsIndex, final, overload
@@ -650,13 +650,13 @@ def view_errors(
     depth: Floats | None,
     lpips: Model | None,
     threads: int,
-) -> tuple[float, float | None, float | None, float | None, float, float | None, float | None]: ...
+) -> dict[str, float | None]: ...
 def surface_errors(
     gaussians: Gaussians,
     points: Floats,
     f_score: float,
     threads: int,
-) -> list[float]: ...
+) -> dict[str, float | None]: ...
 def segment(
     model: Model,
     image: npt.NDArray[np.uint8],
@@ -678,24 +678,12 @@ def reconstruct(
     cameras: Sequence[Camera],
     depths: Sequence[object] | None,
     *,
-    prior: str,
+    options: Mapping[str, object],
     prior_model: Model | None,
     head_model: Model | None,
-    calibrate: str,
-    symmetry: str,
-    relight: str,
-    photo: bool,
     cloud: object | None,
     vehicle_size: Size | None,
     vehicle_place: Placed | None,
-    sh_degree: int,
-    keep: Sequence[str],
-    check: bool,
-    points: bool,
-    budget: float | None,
-    resolution: float,
-    max_views: int | None,
-    max_gaussians: int | None,
     refine_iterations: int | None,
     refine_seconds: float | None,
     refine_hold_out: bool,

@@ -83,16 +83,17 @@ def reconstruct(
     cameras: one per image, posed in the vehicle's frame (x forward, y left, z up, metres; y = 0 is the plane of
     symmetry).
     depths: floats (height, width), metres along the optical axis, 0 for no measurement.
-    prior: source of depth. "given": the depths; "hull": the silhouettes; "shape": the silhouettes and a shape model of
-    vehicles; "onnx": the network prior_model; "auto": the depths if every used view has them, else "shape", fitted to
-    the depths that exist, with a warning.
+    prior: depth source: the scene's own depth ("given"); the visual hull ("hull"); the hull corrected by a shape model
+    of vehicles ("shape"); the network of prior_model ("onnx"); or ("auto") the scene's own depth if every used view has
+    it, else the shape, fitted to the depth of the views that have it, with a warning.
     prior_model, head_model: networks that estimate depth, and that make Gaussians from pixels.
-    calibrate: correct cameras and the plane of symmetry where the silhouettes contradict them ("auto"), or use them as
-    given ("off").
+    calibrate: correct the plane of symmetry and the cameras where the silhouettes contradict them ("auto"), or use them
+    as given ("off").
     symmetry: mirror the unobserved parts ("auto"), all of the denser side ("always"), nothing ("never"), or the
     photographs instead of the model ("flip").
-    relight: relight mirror images for their own side ("auto"), or leave their colours as observed ("never").
-    photo: whether prior "shape" corrects its surface by photo-consistency.
+    relight: relight mirror images for their own side, as far as the observed light allows ("auto"), or leave their
+    colours as observed ("never").
+    photo: correct the shape prior's surface by photo-consistency.
     cloud: points measured on the vehicle, floats (n, 3), metres, vehicle frame, all finite; it may contain outliers.
     Priors "shape" and "hull" fit their surface to them.
     vehicle_size: length, width, height in metres, if known to a few centimetres; the silhouettes determine the pose of
@@ -100,17 +101,18 @@ def reconstruct(
     vehicle_place: x, y, z of that box's centre, metres, and its rotation about z, radians, in the frame of the cameras,
     if known to a few decimetres. Its middle plane, not y = 0, is then the plane of symmetry; the result stays in the
     frame of the cameras.
-    sh_degree: highest degree of the colour, 0 to 3.
-    keep: omissions that must not be made: "duplicate-views", "overlap", "silhouette-edge", "floaters", "sh-bands", or
-    "all".
-    check: render the model into its input views to report the error there.
-    points: also return the point cloud.
-    budget: time limit of the call in seconds, if any; omissions are then chosen to fit.
-    resolution: fraction of their width and height to which the views are resampled first, above 0 and at most 1; a
-    budget may choose less.
-    max_views: use at most this many views, chosen to spread best around the vehicle; a budget may choose fewer.
+    sh_degree: highest degree of the spherical harmonics that hold the colour; 0 to 3.
+    keep: omissions that the plan must not make: "duplicate-views", "overlap", "silhouette-edge", "floaters",
+    "sh-bands", or "all".
+    check: draw the model into its input views and report the error there.
+    points: return the metric coloured point cloud as well.
+    budget: time limit of the reconstruction in seconds; steps that do not fit are left out. None: as long as it takes.
+    resolution: resample the views first to this fraction of their width and height; a budget may choose less; above 0,
+    at most 1.
+    max_views: use at most this many views, chosen to spread best around the vehicle; a budget may choose fewer. None:
+    all.
     max_gaussians: largest number of Gaussians, estimated from the masks; where they would give more, the views are
-    resampled to fewer pixels, which the report's left_out lists. None: any number.
+    resampled to fewer pixels, and the report says so. None: any number.
     refine_iterations, refine_seconds: optimise the model against the photographs for a number of steps, or for about a
     number of seconds, in addition to a budget; the report holds the number of steps.
     refine_hold_out: hold one of three or more views out of the optimisation, to decide when to stop.
@@ -132,24 +134,26 @@ def reconstruct(
         None if masks is None else listed(masks, "masks", 2),
         listed(cameras, "cameras"),
         None if depths is None else listed(depths, "depths", 2),
-        prior=prior,
+        options={
+            "prior": prior,
+            "calibrate": calibrate,
+            "symmetry": symmetry,
+            "relight": relight,
+            "sh_degree": sh_degree,
+            "keep": [keep] if isinstance(keep, str) else listed(keep, "keep"),
+            "check": check,
+            "photo": photo,
+            "budget": budget,
+            "resolution": resolution,
+            "max_views": max_views,
+            "max_gaussians": max_gaussians,
+            "points": points,
+        },
         prior_model=prior_model,
         head_model=head_model,
-        calibrate=calibrate,
-        symmetry=symmetry,
-        relight=relight,
-        photo=photo,
         cloud=cloud,
         vehicle_size=vehicle_size,
         vehicle_place=vehicle_place,
-        sh_degree=sh_degree,
-        keep=[keep] if isinstance(keep, str) else listed(keep, "keep"),
-        check=check,
-        points=points,
-        budget=budget,
-        resolution=resolution,
-        max_views=max_views,
-        max_gaussians=max_gaussians,
         refine_iterations=refine_iterations,
         refine_seconds=refine_seconds,
         refine_hold_out=refine_hold_out,

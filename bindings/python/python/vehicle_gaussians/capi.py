@@ -1504,39 +1504,31 @@ def reconstruct(
     views = _views(images, masks, cameras, depths, names, alive)
     options = _initial(vg_options)
     options.context = _lent_context(context)
-    options.prior, options.symmetry = _choice(Prior, "prior", prior), _choice(Symmetry, "symmetry", symmetry)
-    # Keeps what the arguments point to alive until the call returns.
+    # The options of the library's table.
+    options.prior = _choice(Prior, "prior", prior)
+    options.calibrate = _choice(Calibrate, "calibrate", calibrate)
+    options.symmetry = _choice(Symmetry, "symmetry", symmetry)
+    options.relight = _choice(Relight, "relight", relight)
+    options.sh_degree = whole(sh_degree, "sh_degree", 0, 3, "0 to 3")
+    options.keep = _kept(keep)
+    options.check = check
+    options.photo = photo
+    options.budget_s = _real_or_0(budget, "budget", "seconds above 0")
+    options.resolution = real(resolution, "resolution")
+    options.max_views = _whole_or_0(max_views, "max_views", 1, sys.maxsize, "at least 1")
+    options.max_gaussians = _whole_or_0(max_gaussians, "max_gaussians", 1, sys.maxsize, "at least 1")
+    options.points = points
+    # The others.
+    # Referred to by this call's arguments until it returns.
     options.prior_model = _lent_model(prior_model, "prior_model")
     options.head_model = _lent_model(head_model, "head_model")
-    options.calibrate = _choice(Calibrate, "calibrate", calibrate)
-    options.relight, options.photo = _choice(Relight, "relight", relight), photo
-    if budget is not None:
-        # In C, 0 means none.
-        if budget == 0:
-            raise bad_value("budget", budget, "seconds above 0")
-        options.budget_s = real(budget, "budget")
-    options.resolution = real(resolution, "resolution")
-    if max_views is not None:
-        # In C, 0 means all.
-        options.max_views = whole(max_views, "max_views", 1, sys.maxsize, "at least 1")
-    # In C, 0 means any number.
-    options.max_gaussians = (
-        0 if max_gaussians is None else whole(max_gaussians, "max_gaussians", 1, sys.maxsize, "at least 1")
-    )
-    if refine_iterations is not None:
-        # In C, 0 means none.
-        options.refine_iterations = whole(refine_iterations, "refine_iterations", 1, _U32, "1 to 1000000")
-    if refine_seconds is not None:
-        if refine_seconds == 0:
-            raise bad_value("refine_seconds", refine_seconds, "above 0, at most 86400")
-        options.refine_seconds = real(refine_seconds, "refine_seconds")
+    options.refine_iterations = _whole_or_0(refine_iterations, "refine_iterations", 1, _U32, "1 to 1000000")
+    options.refine_seconds = _real_or_0(refine_seconds, "refine_seconds", "above 0, at most 86400")
     options.refine_hold_out = refine_hold_out
     options.refine_backend = _choice(Backend, "refine_backend", refine_backend)
     if cloud is not None:
         alive.append(_measured(cloud, "cloud"))
         options.cloud, options.cloud_count = alive[-1].ctypes.data, len(alive[-1])
-    options.sh_degree, options.keep = whole(sh_degree, "sh_degree", 0, 3), _kept(keep)
-    options.check, options.points = check, points
     if vehicle_size is not None:
         options.vehicle_size[:] = doubles(vehicle_size, "vehicle_size", (3,)).tolist()
     if vehicle_place is not None:
@@ -1698,6 +1690,20 @@ def _logger(
             raised.append(error)
 
     return on_log
+
+
+def _whole_or_0(number: int | None, argument: str, lowest: int, highest: int, allowed: str) -> int:
+    """A whole number for C, where 0 is none."""
+    return 0 if number is None else whole(number, argument, lowest, highest, allowed)
+
+
+def _real_or_0(number: float | None, argument: str, allowed: str) -> float:
+    """A number for C, where 0 is none."""
+    if number is None:
+        return 0.0
+    if number == 0:
+        raise bad_value(argument, number, allowed)
+    return real(number, argument)
 
 
 def _choice(choices: type[enum.IntEnum], argument: str, name: str) -> int:

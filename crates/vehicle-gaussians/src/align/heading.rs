@@ -3,19 +3,21 @@
 use super::WorldView;
 use glam::DVec3;
 use vg_geometry::Similarity;
-use vg_geometry::{Error, Result};
+use vg_geometry::{Error, Result, choices};
 use vg_scene::View;
 
-/// Method of distinguishing front and back.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Heading {
-    /// By shape; if the reverse fits equally well, an error that names the view to decide by.
-    #[default]
-    Auto,
-    /// The first view by name, of those not taken from abeam, was taken from ahead of the vehicle's middle.
-    Forward,
-    /// That view was taken from behind the middle.
-    Backward,
+choices! {
+    /// How front and back are told apart.
+    #[derive(Default)]
+    pub enum Heading as "heading" {
+        /// By shape; where the other way round fits as well, it is an error that names the view to look at.
+        #[default]
+        Auto = 0 "auto",
+        /// The first view by name, of those not taken from abeam, was taken from ahead of the vehicle's middle.
+        Forward = 1 "forward",
+        /// It was taken from behind the middle.
+        Backward = 2 "backward",
+    }
 }
 
 /// Sine of the smallest angle from abeam (17 degrees) at which ahead and behind are easy to tell in a picture.

@@ -2,17 +2,18 @@
 
 use serde::Serialize;
 use std::fmt;
+use vg_geometry::choices;
 
-/// Outcome of the calibration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// The silhouettes agree already: nothing was estimated.
-    NotNeeded,
-    /// The cameras were moved.
-    Accepted,
-    /// A correction was estimated and discarded: the cameras are the caller's.
-    Refused,
+choices! {
+    /// What became of the correction of the cameras.
+    pub enum Verdict as "calibration" {
+        /// The silhouettes agree already.
+        NotNeeded = 1 "not-needed",
+        /// The cameras were moved.
+        Accepted = 2 "accepted",
+        /// A correction was estimated and thrown away.
+        Refused = 3 "refused",
+    }
 }
 
 /// A parameter that reached the largest error that is corrected.

@@ -2,28 +2,30 @@
 
 use super::{on_white, psnr, psnr_in, silhouette_iou, ssim};
 use serde::Serialize;
-use vg_geometry::Result;
 use vg_geometry::progress::Threads;
+use vg_geometry::{Result, measures};
 use vg_scene::{Scene, View};
 use vg_splat::Gaussians;
 use vg_splat::render::{CpuRenderer, RenderOptions, Rendered};
 
-/// Errors of one render on white, or the means over several; `None` where a metric is undefined.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct ViewErrors {
-    /// PSNR over the full frame, dB.
-    pub psnr_db: f64,
-    /// SSIM over the full frame; `None` for a picture smaller than the window.
-    pub ssim: Option<f64>,
-    /// PSNR inside the bounding box of the mask, dB; `None` where the mask is empty.
-    pub psnr_box_db: Option<f64>,
-    /// Intersection over union of alpha >= 0.5 and the mask.
-    pub silhouette_iou: f64,
-    /// Mean absolute difference of depth, metres, over pixels where the view has depth and alpha >= 0.5; `None` without
-    /// such pixels.
-    pub depth_mae_m: Option<f64>,
-    /// 90th percentile of that difference, metres.
-    pub depth_p90_m: Option<f64>,
+measures! {
+    /// Error of one render on white, or the means over several; `None` where a measure does not exist.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+    pub struct ViewErrors {
+        /// Peak signal-to-noise ratio over the full frame, dB; infinite for equal pictures.
+        pub psnr_db: f64 => ("PSNR dB", 3, Higher),
+        /// Structural similarity over the full frame, at most 1; `None` for a picture smaller than 11x11.
+        pub ssim: Option<f64> => ("SSIM", 4, Higher),
+        /// Peak signal-to-noise ratio inside the bounding box of the mask, dB; `None` where the mask is empty.
+        pub psnr_box_db: Option<f64> => ("PSNR box", 3, Higher),
+        /// Intersection over union of the mask and the pixels that the model covers by half or more, 0 to 1.
+        pub silhouette_iou: f64 => ("IoU", 4, Higher),
+        /// Mean absolute difference of depth where the view has depth and the model covers the pixel by half or more,
+        /// metres; `None` where that is nowhere.
+        pub depth_mae_m: Option<f64> => ("depth MAE m", 4, Lower),
+        /// 90th percentile of that difference, metres.
+        pub depth_p90_m: Option<f64> => ("", 4, Lower),
+    }
 }
 
 impl ViewErrors {
@@ -59,19 +61,6 @@ impl ViewErrors {
             Ok(Self::of(&drawn, view))
         };
         threads.run(|| scene.views.iter().map(&mut of).collect())
-    }
-
-    /// Means over views, each metric over the views that have it; `None` for no views.
-    pub fn mean(errors: &[Self]) -> Option<Self> {
-        let of = |get: &dyn Fn(&Self) -> Option<f64>| mean(errors.iter().filter_map(get));
-        Some(Self {
-            psnr_db: of(&|e| Some(e.psnr_db))?,
-            ssim: of(&|e| e.ssim),
-            psnr_box_db: of(&|e| e.psnr_box_db),
-            silhouette_iou: of(&|e| Some(e.silhouette_iou))?,
-            depth_mae_m: of(&|e| e.depth_mae_m),
-            depth_p90_m: of(&|e| e.depth_p90_m),
-        })
     }
 }
 

@@ -35,7 +35,7 @@ pub use budget::{BudgetPlan, Chosen};
 pub use cap::{DEFAULT_MAX_GAUSSIANS, GAUSSIANS};
 pub use machine::Machine;
 pub use method::Method;
-pub use options::{Calibrate, Keep, Options, PriorChoice};
+pub use options::{Calibrate, Keep, KeepItem, Options, PriorChoice};
 pub use parts::Parts;
 pub use report::{CheckedView, InputError, LeftOut, Report, Stage};
 pub use run::{PointCloud, Reconstruction, reconstruct, reconstruct_on, reconstruct_with};

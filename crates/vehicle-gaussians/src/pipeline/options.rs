@@ -5,140 +5,214 @@ use crate::refine::RefineOptions;
 use crate::relight::Relight;
 use crate::symmetry::SymmetryMode;
 use serde::{Deserialize, Serialize};
-use vg_geometry::{Error, Result};
+use vg_geometry::options::{Face, Kind, Range, Setting, Value};
+use vg_geometry::{Choice, Error, Result, choices, options};
 use vg_scene::onnx::{self, Model};
 use vg_scene::{Place, Scene, VehicleBox};
+use vg_splat::gaussians::sh::MAX_DEGREE;
 
-/// The depth source.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum PriorChoice {
-    /// `Given` if every used view has depth, else `Shape`, the best prior that needs none. Where some views have depth,
-    /// the surface of the shape prior is fitted to it as measured points.
-    #[default]
-    Auto,
-    /// The caller's metric depth.
-    Given,
-    /// The visual hull of the silhouettes and their mirrored twins.
-    Hull,
-    /// The hull, corrected by a network that learned the shapes of vehicles.
-    Shape,
-    /// The network of [`Options::prior_model`].
-    Onnx,
-}
-
-impl PriorChoice {
-    /// The name on the command line and in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Auto => "auto",
-            Self::Given => "given",
-            Self::Hull => "hull",
-            Self::Shape => "shape",
-            Self::Onnx => "onnx",
-        }
+choices! {
+    /// Where metric depth comes from.
+    #[derive(Default, Deserialize)]
+    #[serde(rename_all = "lowercase")]
+    pub enum PriorChoice as "prior" {
+        /// [`PriorChoice::Given`] if every used view has depth, else [`PriorChoice::Shape`]. Where some views have depth,
+        /// it counts as measured points, to which the shape bends, and `log` is told.
+        #[default]
+        Auto = 0 "auto",
+        /// The depth in the views.
+        Given = 1 "given",
+        /// The hull of the silhouettes and their mirrored twins; needs masks and nothing else.
+        Hull = 2 "hull",
+        /// The hull, corrected by what vehicles look like; needs masks and nothing else.
+        Shape = 4 "shape",
+        /// The network of [`Options::prior_model`]. [`Error::NotBuilt`] in a build without networks.
+        Onnx = 3 "onnx",
     }
 }
 
-/// Whether the plane of symmetry and the cameras are corrected before anything else, see [`crate::calibrate`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Calibrate {
-    /// They are corrected where the silhouettes do not agree and the correction makes them agree better.
-    #[default]
-    Auto,
-    /// The caller's cameras are used unchanged.
-    Off,
+choices! {
+    /// Whether cameras and the plane of symmetry are corrected before anything else.
+    #[derive(Default)]
+    pub enum Calibrate as "calibrate" {
+        /// Where the silhouettes do not agree, and agree better with the correction.
+        #[default]
+        Auto = 0 "auto",
+        /// The cameras are taken as they are.
+        Off = 1 "off",
+    }
+}
+
+choices! {
+    /// What may not be left out although the scene does not need it; bits of [`Options::keep`].
+    pub enum KeepItem as "keep" {
+        /// Views whose camera another view already has.
+        DuplicateViews = 1 "duplicate-views",
+        /// Pixels that another view shows at a higher resolution.
+        Overlap = 2 "overlap",
+        /// Pixels on the silhouette's edge.
+        SilhouetteEdge = 4 "silhouette-edge",
+        /// Floating pixels at depth edges.
+        Floaters = 8 "floaters",
+        /// Bands of colour that the spread of viewing directions cannot support.
+        ShBands = 16 "sh-bands",
+    }
 }
 
 /// Work that the plan would leave out, done anyway; all `false` by default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
 pub struct Keep {
-    /// Views whose camera another view already has.
+    /// [`KeepItem::DuplicateViews`].
     pub duplicate_views: bool,
-    /// Pixels that another view shows at a higher resolution.
+    /// [`KeepItem::Overlap`].
     pub overlap: bool,
-    /// Pixels on the silhouette's edge.
+    /// [`KeepItem::SilhouetteEdge`].
     pub silhouette_edge: bool,
-    /// Floating pixels at depth edges.
+    /// [`KeepItem::Floaters`].
     pub floaters: bool,
-    /// SH bands that the spread of viewing directions cannot support.
+    /// [`KeepItem::ShBands`].
     pub sh_bands: bool,
 }
 
-/// Settings of a reconstruction.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Options {
-    /// Depth source.
-    pub prior: PriorChoice,
-    /// A geometry network for the `Onnx` prior, see [`crate::prior::network`].
-    pub prior_model: Option<Model>,
-    /// A Gaussian head, see [`crate::head::network`]; `None` for the surfel head, which needs no weights.
-    pub head_model: Option<Model>,
-    /// Whether to ignore the offsets that `head_model` predicts (the paper's ablation).
-    pub ignore_offset: bool,
-    /// Whether cameras are corrected where the silhouettes contradict them.
-    pub calibrate: Calibrate,
-    /// When Gaussians are cloned across y = 0.
-    pub symmetry: SymmetryMode,
-    /// Whether clones are shown in the light of their own side.
-    pub relight: Relight,
-    /// Length, width, height in metres, where known: the vehicle is placed within the boxes of this size that fit the
-    /// silhouettes. Overrides [`Scene::vehicle_box`](vg_scene::Scene::vehicle_box).
-    pub vehicle_size: Option<[f64; 3]>,
-    /// The place of a box of `vehicle_size`, to a few decimetres. Its middle plane, not y = 0, is then the plane of
-    /// symmetry; the result is in the frame of the cameras anyway.
-    pub vehicle_place: Option<Place>,
-    /// Highest SH degree of the colour, 0 to 3.
-    pub sh_degree: u8,
-    /// Work that the plan must not leave out.
-    pub keep: Keep,
-    /// Whether to draw the model into its input views and report the error there.
-    pub check: bool,
-    /// Whether the `Shape` prior moves its surface to where the photographs agree.
-    pub photo: bool,
-    /// Time limit of the whole call, seconds: the plan leaves out what does not fit. `None` for no limit.
-    pub budget_s: Option<f64>,
-    /// Views are resampled to this share of their width and height before anything else, above 0 to 1.
-    pub resolution: f64,
-    /// The most views to use; those that spread best around the vehicle are kept.
-    pub max_views: Option<usize>,
-    /// The most Gaussians that the model may have, as estimated from the masks of the used views, see
-    /// [`cap`](super::cap); `None` for any number. Where the masks allow for more, the views are resampled to fewer
-    /// pixels first, and the report contains the reason. A refinement that densifies can exceed it.
-    pub max_gaussians: Option<usize>,
-    /// Worker threads; 0 means one per core.
-    pub threads: usize,
-    /// Whether to return the metric coloured point cloud as well.
-    pub points: bool,
-    /// The optimisation of the result against the photographs; `None`, the default, for none.
-    pub refine: Option<RefineOptions>,
+impl Keep {
+    /// Everything that is named.
+    pub fn from_items(items: impl IntoIterator<Item = KeepItem>) -> Self {
+        let mut keep = Self::default();
+        for item in items {
+            *keep.item(item) = true;
+        }
+        keep
+    }
+
+    /// Everything that is kept.
+    pub fn items(mut self) -> impl Iterator<Item = KeepItem> {
+        KeepItem::ALL.iter().copied().filter(move |&item| *self.item(item))
+    }
+
+    fn item(&mut self, item: KeepItem) -> &mut bool {
+        match item {
+            KeepItem::DuplicateViews => &mut self.duplicate_views,
+            KeepItem::Overlap => &mut self.overlap,
+            KeepItem::SilhouetteEdge => &mut self.silhouette_edge,
+            KeepItem::Floaters => &mut self.floaters,
+            KeepItem::ShBands => &mut self.sh_bands,
+        }
+    }
 }
 
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            prior: PriorChoice::Auto,
-            prior_model: None,
-            head_model: None,
-            ignore_offset: false,
-            calibrate: Calibrate::Auto,
-            symmetry: SymmetryMode::Auto,
-            relight: Relight::Auto,
-            vehicle_size: None,
-            vehicle_place: None,
-            sh_degree: 2,
-            keep: Keep::default(),
-            check: true,
-            photo: true,
-            budget_s: None,
-            resolution: 1.0,
-            max_views: None,
-            max_gaussians: Some(DEFAULT_MAX_GAUSSIANS),
-            threads: 0,
-            points: false,
-            refine: None,
-        }
+impl Setting for Keep {
+    const KIND: Kind = Kind::Set(KeepItem::enumeration);
+
+    fn value(&self) -> Value {
+        Value::Names(self.items().map(|item| item.name().to_owned()).collect())
+    }
+
+    fn from_value(argument: &str, value: Value) -> Result<Self> {
+        let Value::Names(names) = value else { return Err(value.refused(argument, "names")) };
+        let items = names.iter().map(|name| KeepItem::from_name(argument, name));
+        items.collect::<Result<Vec<_>>>().map(Self::from_items)
+    }
+}
+
+options! {
+    /// Settings of a reconstruction.
+    #[derive(Clone, Debug, PartialEq, Serialize)]
+    pub struct Options {
+        /// Where metric depth comes from.
+        pub prior: PriorChoice = PriorChoice::Auto => {
+            help: "Depth source: the scene's own depth (given); the visual hull (hull); the hull corrected by a shape \
+                   model of vehicles (shape); the network of --prior-model (onnx); or (auto) the scene's own depth if \
+                   every used view has it, else the shape, fitted to the depth of the views that have it, with a warning",
+        },
+        /// A geometry network for the `Onnx` prior, see [`crate::prior::network`].
+        pub prior_model: Option<Model> = None,
+        /// A Gaussian head, see [`crate::head::network`]; `None` for the surfel head, which needs no weights.
+        pub head_model: Option<Model> = None,
+        /// Leave out the offsets that `head_model` answers (the paper's ablation), whatever the model was trained with.
+        pub ignore_offset: bool = false,
+        /// Whether cameras are corrected where the silhouettes contradict them.
+        pub calibrate: Calibrate = Calibrate::Auto => {
+            help: "Correct the plane of symmetry and the cameras where the silhouettes contradict them (auto), or use \
+                   them as given (off)",
+        },
+        /// How the side that was not photographed is completed.
+        pub symmetry: SymmetryMode = SymmetryMode::Auto => {
+            help: "Mirror the unobserved parts (auto), all of the denser side (always), nothing (never), or the \
+                   photographs instead of the model (flip)",
+        },
+        /// Whether mirror images are shown in the light of their own side.
+        pub relight: Relight = Relight::Auto => {
+            help: "Relight mirror images for their own side, as far as the observed light allows (auto), or leave their \
+                   colours as observed (never)",
+        },
+        /// Length, width, height in metres, where known: no part of the vehicle is placed where no box of this size can
+        /// stand that fits the silhouettes. Goes before [`Scene::vehicle_box`](vg_scene::Scene::vehicle_box).
+        pub vehicle_size: Option<[f64; 3]> = None,
+        /// Where a box of `vehicle_size` stands, to a few decimetres. Its middle plane, not y = 0, is then the plane of
+        /// symmetry; the result is in the frame of the cameras all the same.
+        pub vehicle_place: Option<Place> = None,
+        /// Highest degree of the colour's spherical harmonics, 0 to 3.
+        pub sh_degree: u8 = 2 => {
+            help: "Highest degree of the spherical harmonics that hold the colour",
+            range: Some(Range::closed(0.0, f64::from(MAX_DEGREE), "0 to 3")),
+            value_name: Some("0..3"),
+        },
+        /// What the plan may not leave out.
+        pub keep: Keep = Keep::default() => {
+            help: "Omissions that the plan must not make",
+            value_name: Some("LIST"),
+        },
+        /// `true`: draw the model into its input views and report the error there; `false`: do not.
+        pub check: bool = true => {
+            help: "Draw the model into its input views and report the error there",
+            apart: &[Face::Program],
+        },
+        /// `true`: [`PriorChoice::Shape`] moves its surface to where the photographs agree; `false`: it does not.
+        pub photo: bool = true => {
+            help: "Correct the shape prior's surface by photo-consistency",
+        },
+        /// Seconds the call may take, above 0, where that matters: what is left out is then chosen to fit. `None`: as long
+        /// as it takes.
+        pub budget_s: Option<f64> = None => {
+            help: "Time limit of the reconstruction in seconds; steps that do not fit are left out",
+            range: Some(Range::above(0.0, f64::MAX, "seconds above 0")),
+            short: Some("budget"),
+            none: Some("as long as it takes"),
+            value_name: Some("SECONDS"),
+        },
+        /// Views are first resampled to this share of their width and height, above 0, at most 1. A `budget_s` may choose
+        /// less.
+        pub resolution: f64 = 1.0 => {
+            help: "Resample the views first to this fraction of their width and height; a budget may choose less",
+            range: Some(Range::above(0.0, 1.0, "above 0, at most 1")),
+            value_name: Some("SHARE"),
+        },
+        /// At most this many views are used, those that spread best around the vehicle; `None`: all. A `budget_s` may choose
+        /// fewer.
+        pub max_views: Option<usize> = None => {
+            help: "Use at most this many views, chosen to spread best around the vehicle; a budget may choose fewer",
+            range: Some(Range::closed(1.0, f64::MAX, "at least 1")),
+            none: Some("all"),
+        },
+        /// Most Gaussians that the model may have by what the masks of the used views say of its size: twice their vehicle
+        /// pixels, or six times those of the largest mask, whichever is less. Where that is more, the views are resampled to
+        /// fewer pixels before the work, and the log and the report say so. `None`: any number. Default 12000000, whose PLY
+        /// file would have 2 GB.
+        pub max_gaussians: Option<usize> = Some(DEFAULT_MAX_GAUSSIANS) => {
+            help: "Largest number of Gaussians, estimated from the masks; where they would give more, the views are \
+                   resampled to fewer pixels, and the report says so",
+            range: Some(Range::closed(1.0, f64::MAX, "at least 1")),
+            none: Some("any number"),
+        },
+        /// Worker threads; 0 means one per core.
+        pub threads: usize = 0,
+        /// `true`: the report also holds the metric coloured point cloud; `false`: it does not.
+        pub points: bool = false => {
+            help: "Return the metric coloured point cloud as well",
+            apart: &[Face::Program],
+        },
+        /// How the result is optimised against the photographs; `None`, the default: it is not.
+        pub refine: Option<RefineOptions> = None,
     }
 }
 
@@ -172,26 +246,9 @@ impl Options {
             }
             (None, None) => {}
         }
-        if let Some(budget) = self.budget_s
-            && !(budget > 0.0 && budget.is_finite())
-        {
-            return Err(Error::argument("options.budget_s", budget.to_string(), "seconds above 0"));
-        }
-        if !(self.resolution > 0.0 && self.resolution <= 1.0) {
-            let found = self.resolution.to_string();
-            return Err(Error::argument("options.resolution", found, "above 0, at most 1"));
-        }
-        if self.max_views == Some(0) {
-            return Err(Error::argument("options.max_views", "0", "at least 1"));
-        }
-        if self.max_gaussians == Some(0) {
-            return Err(Error::argument("options.max_gaussians", "0", "at least 1"));
-        }
+        self.check_ranges("options")?;
         if let Some(refine) = &self.refine {
             refine.validate()?;
-        }
-        if self.sh_degree > vg_splat::gaussians::sh::MAX_DEGREE {
-            return Err(Error::argument("options.sh_degree", self.sh_degree.to_string(), "0 to 3"));
         }
         Ok(())
     }

@@ -31,24 +31,24 @@ use plan::Plan;
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::time::Instant;
-use vg_geometry::Result;
 use vg_geometry::progress::Context;
+use vg_geometry::{Result, choices};
 use vg_scene::View;
 use vg_splat::Gaussians;
 use work::{Measures, Work};
 
-/// Reason why a refinement ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Stop {
-    /// All steps are done.
-    Done,
-    /// The held-out view stopped getting better.
-    HeldOut,
-    /// The error grew far beyond its initial value: the steps are too large.
-    Diverged,
-    /// No view sees any part of the model, so there is no gradient.
-    Unseen,
+choices! {
+    /// Why a refinement ended.
+    pub enum Stop as "refine_stop" {
+        /// All steps are done.
+        Done = 0 "done",
+        /// The view that took no part got no better any more.
+        HeldOut = 1 "held_out",
+        /// The error grew far beyond where it began; the best of the states before is returned.
+        Diverged = 2 "diverged",
+        /// No view sees anything of the model: it is as it was.
+        Unseen = 3 "unseen",
+    }
 }
 
 /// Report of a refinement.

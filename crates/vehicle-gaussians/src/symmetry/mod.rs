@@ -15,24 +15,23 @@ pub(crate) use clone::MirrorClone;
 pub(crate) use decision::{BETTER, Completed};
 
 use serde::Serialize;
-use vg_geometry::Camera;
+use vg_geometry::{Camera, choices};
 use vg_splat::Gaussians;
 
-/// When Gaussians are cloned.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum SymmetryMode {
-    /// Each place is shown by the better of its own observation and that of its mirror image: a Gaussian is cloned
-    /// where no view saw the mirrored place, and removed where the mirrored place was seen better.
-    #[default]
-    Auto,
-    /// The paper's rule: the side with more Gaussians is the reference, and its mirror image replaces the other side,
-    /// whatever was observed there.
-    Always,
-    /// No cloning.
-    Never,
-    /// No cloning: the mirrored photographs are used as additional views, the alternative that the paper compares with.
-    Flip,
+choices! {
+    /// How the side that was not photographed is completed across the plane y = 0.
+    #[derive(Default)]
+    pub enum SymmetryMode as "symmetry" {
+        /// What no view observed is mirrored; what the other side shows at 1.03 times the resolution gives way.
+        #[default]
+        Auto = 0 "auto",
+        /// The side with more Gaussians replaces the other, whatever was observed there.
+        Always = 1 "always",
+        /// Nothing is mirrored.
+        Never = 2 "never",
+        /// The photographs are mirrored instead of the model, and taken for further views: slower, and rarely better.
+        Flip = 3 "flip",
+    }
 }
 
 /// A side of the plane y = 0.

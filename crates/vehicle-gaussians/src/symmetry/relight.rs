@@ -21,18 +21,19 @@ use glam::{Quat, Vec3};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::ops::Range;
-use vg_geometry::MIRROR_Y;
+use vg_geometry::{MIRROR_Y, choices};
 use vg_splat::gaussians::{Gaussians, sh};
 
-/// Whether clones are shown in the light of their own side.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Relight {
-    /// Yes, as far as the seen side determines the light.
-    #[default]
-    Auto,
-    /// No: clones keep the light of the seen side.
-    Never,
+choices! {
+    /// Whether mirror images are shown in the light of their own side.
+    #[derive(Default)]
+    pub enum Relight as "relight" {
+        /// As far as the light can be told from what was seen.
+        #[default]
+        Auto = 0 "auto",
+        /// They keep the light of the side that was seen.
+        Never = 1 "never",
+    }
 }
 
 /// The estimated light, and how many clones it changed.

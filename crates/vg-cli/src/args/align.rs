@@ -1,7 +1,7 @@
 //! Options of `align`.
 
-use super::values::{VehicleSize, vehicle_size};
-use clap::{Args, ValueEnum};
+use super::values::{VehicleSize, choice, vehicle_size};
+use clap::Args;
 use std::path::{Path, PathBuf};
 use vg::align::Heading;
 
@@ -25,21 +25,14 @@ pub(crate) struct AlignArgs {
     matrix: Option<PathBuf>,
     /// With --scan and --box: whether the first view by name that is not seen square from the side was taken from ahead
     /// of the vehicle's centre (forward) or from behind it (backward); auto: decided by the scan's shape
-    #[arg(long, value_name = "auto|forward|backward", default_value = "auto", conflicts_with_all = ["known_centers", "matrix"], hide_default_value = true, hide_possible_values = true)]
-    heading: Side,
+    #[arg(long, value_name = "auto|forward|backward", default_value = "auto", value_parser = choice::<Heading>(), conflicts_with_all = ["known_centers", "matrix"], hide_default_value = true, hide_possible_values = true)]
+    pub(crate) heading: Heading,
     /// Worker threads; 0 means one per core
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) threads: usize,
     /// Output file of the similarity, for --vehicle-from-world
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: PathBuf,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Side {
-    Auto,
-    Forward,
-    Backward,
 }
 
 /// Input from which the vehicle's frame is found.
@@ -59,14 +52,6 @@ impl AlignArgs {
             (.., Some(matrix)) => Mode::Matrix(matrix),
             // The parser accepts exactly one of the four.
             _ => Mode::Scan(self.scan.as_ref().and_then(|scan| scan.as_deref())),
-        }
-    }
-
-    pub(crate) fn heading(&self) -> Heading {
-        match self.heading {
-            Side::Auto => Heading::Auto,
-            Side::Forward => Heading::Forward,
-            Side::Backward => Heading::Backward,
         }
     }
 }

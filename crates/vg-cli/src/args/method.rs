@@ -1,25 +1,21 @@
 //! Command-line options of a reconstruction.
 
-use super::values::{KnownBox, at_least_one, backend, known_box, positive, refinement, share};
+use super::settings::Settings;
+use super::values::{KnownBox, choice, known_box, refinement};
 use crate::job::{self, Failure, USAGE};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use vg::onnx::{Model, ModelOptions, Provider};
-use vg::pipeline::{BaselineRun, Calibrate, DEFAULT_MAX_GAUSSIANS, Keep, Method, Options, PriorChoice};
+use vg::pipeline::{BaselineRun, Method, Options, PriorChoice};
 use vg::refine::baseline::BaselineOptions;
 use vg::refine::{Amount, Densify, RefineOptions};
-use vg::relight::Relight;
 use vg::render::Backend;
-use vg::symmetry::SymmetryMode;
 
 /// Options of a reconstruction, shared by `reconstruct`, `eval` and `report`.
 #[derive(Args)]
 pub(crate) struct MethodArgs {
-    /// Depth source: the scene's own depth (given); the visual hull (hull); the hull corrected by a shape model of
-    /// vehicles (shape); the network of --prior-model (onnx); or (auto) given if every used view has depth, else shape,
-    /// fitted to the depth of the views that have it
-    #[arg(long, value_enum, default_value_t = Prior::Auto)]
-    prior: Prior,
+    #[command(flatten)]
+    settings: Settings,
     /// Geometry network for --prior onnx: an ONNX file that meets the contract of docs/ONNX.md
     #[arg(long, value_name = "M.onnx")]
     pub(crate) prior_model: Option<PathBuf>,
@@ -35,44 +31,13 @@ pub(crate) struct MethodArgs {
     /// Device for networks: the CPU, CUDA, or CUDA where available (auto)
     #[arg(long, value_enum, default_value_t = RunsOn::Cpu)]
     provider: RunsOn,
-    /// Mirror the unobserved parts (auto), all of the denser side (always), nothing (never), or the photographs instead
-    /// of the model (flip)
-    #[arg(long, value_enum, default_value_t = Symmetry::Auto)]
-    symmetry: Symmetry,
-    /// Relight mirror images for their own side, as far as the observed light allows (auto), or leave their colours as
-    /// observed (never)
-    #[arg(long, value_enum, default_value_t = Relit::Auto)]
-    relight: Relit,
-    /// Correct the plane of symmetry and the cameras where the silhouettes contradict them (auto), or use them as given
-    /// (off)
-    #[arg(long, value_enum, default_value_t = Calibration::Auto)]
-    calibrate: Calibration,
     /// Length, width and height of the vehicle in metres, if known to a few centimetres; X,Y,Z,YAW add the pose of its
     /// box: the centre in metres and the rotation about z in radians, in the frame of the cameras
     #[arg(long = "box", value_name = "L,W,H[,X,Y,Z,YAW]", value_parser = known_box, allow_hyphen_values = true)]
     vehicle_box: Option<KnownBox>,
-    /// Highest degree of the spherical harmonics that hold the colour [default: 2; with --baseline 3]
-    #[arg(long, value_name = "0..3", value_parser = clap::value_parser!(u8).range(0..=3))]
-    sh_degree: Option<u8>,
     /// Points measured on the vehicle, PLY in its frame, metres; an estimated surface is fitted to them
     #[arg(long, value_name = "P.ply")]
     pub(crate) cloud: Option<PathBuf>,
-    /// Omissions that the plan must not make, separated by commas
-    #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
-    keep: Vec<KeepItem>,
-    /// Time limit of the reconstruction in seconds; steps that do not fit are left out
-    #[arg(long, value_name = "SECONDS", value_parser = positive)]
-    budget: Option<f64>,
-    /// Resample the views first to this fraction of their width and height
-    #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = share)]
-    resolution: f64,
-    /// Use at most N views, chosen to spread best around the vehicle
-    #[arg(long, value_name = "N", value_parser = at_least_one)]
-    max_views: Option<usize>,
-    /// Largest number of Gaussians, estimated from the masks; where they would give more, the views are resampled to
-    /// fewer pixels
-    #[arg(long, value_name = "N", default_value_t = DEFAULT_MAX_GAUSSIANS, value_parser = at_least_one)]
-    max_gaussians: usize,
     /// Optimise the model against the photographs for a number of steps (300) or of seconds (5s)
     #[arg(long, value_name = "N|SECONDSs", value_parser = refinement)]
     refine: Option<Amount>,
@@ -84,15 +49,12 @@ pub(crate) struct MethodArgs {
     refine_densify: bool,
     /// Device for rendering and gradients in the optimisation: cpu, gpu (in a build with GPU support), or auto, at
     /// present the CPU
-    #[arg(long, requires = "refine", value_name = "auto|cpu|gpu", default_value = "auto", value_parser = backend)]
+    #[arg(long, requires = "refine", default_value = "auto", value_parser = choice::<Backend>())]
     refine_backend: Backend,
     /// Fit another method to the input views instead, for comparison: 3D Gaussian splatting from a random start or from
     /// --cloud, without any prior; --refine sets the number of steps (2000) or seconds
     #[arg(long, value_enum, value_name = "METHOD", conflicts_with_all = CONFLICTS_WITH_BASELINE)]
     baseline: Option<Baseline>,
-    /// Do not correct the shape prior's surface by photo-consistency
-    #[arg(long)]
-    no_photo: bool,
     /// Worker threads; 0 means one per core
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) threads: usize,
@@ -121,7 +83,7 @@ const CONFLICTS_WITH_BASELINE: [&str; 16] = [
 impl MethodArgs {
     /// The method for the library, with its models open.
     pub(crate) fn method(&self) -> job::Result<Method> {
-        let mismatch = match (self.prior == Prior::Onnx, self.prior_model.is_some()) {
+        let mismatch = match (self.settings.options.prior == PriorChoice::Onnx, self.prior_model.is_some()) {
             (true, false) => Some("--prior onnx needs a network: --prior-model M.onnx"),
             (false, true) => Some("--prior-model M.onnx is used only with --prior onnx"),
             _ => None,
@@ -165,67 +127,32 @@ impl MethodArgs {
     }
 
     fn baseline_run(&self) -> BaselineRun {
-        let default = BaselineOptions::default();
+        let (table, default) = (&self.settings, BaselineOptions::default());
         BaselineRun {
             baseline: BaselineOptions {
                 amount: self.refine.unwrap_or(default.amount),
-                sh_degree: self.sh_degree.unwrap_or(default.sh_degree),
+                sh_degree: match table.is_given("sh_degree") {
+                    true => table.options.sh_degree,
+                    false => default.sh_degree,
+                },
                 ..default
             },
             vehicle_size: self.vehicle_box.map(|known| known.0.size),
             vehicle_place: self.vehicle_box.and_then(|known| known.0.place),
-            resolution: self.resolution,
-            max_views: self.max_views,
+            resolution: table.options.resolution,
+            max_views: table.options.max_views,
             threads: self.threads,
             ..BaselineRun::default()
         }
     }
 
     fn options_without_models(&self) -> Options {
-        let kept = |item: KeepItem| self.keep.contains(&item) || self.keep.contains(&KeepItem::All);
+        let table = &self.settings;
         Options {
-            prior: match self.prior {
-                Prior::Auto => PriorChoice::Auto,
-                Prior::Given => PriorChoice::Given,
-                Prior::Hull => PriorChoice::Hull,
-                Prior::Shape => PriorChoice::Shape,
-                Prior::Onnx => PriorChoice::Onnx,
-            },
-            prior_model: None,
-            head_model: None,
             ignore_offset: self.no_offset,
-            symmetry: match self.symmetry {
-                Symmetry::Auto => SymmetryMode::Auto,
-                Symmetry::Always => SymmetryMode::Always,
-                Symmetry::Never => SymmetryMode::Never,
-                Symmetry::Flip => SymmetryMode::Flip,
-            },
-            relight: match self.relight {
-                Relit::Auto => Relight::Auto,
-                Relit::Never => Relight::Never,
-            },
-            calibrate: match self.calibrate {
-                Calibration::Auto => Calibrate::Auto,
-                Calibration::Off => Calibrate::Off,
-            },
             vehicle_size: self.vehicle_box.map(|known| known.0.size),
             vehicle_place: self.vehicle_box.and_then(|known| known.0.place),
-            sh_degree: self.sh_degree.unwrap_or(Options::default().sh_degree),
-            keep: Keep {
-                duplicate_views: kept(KeepItem::DuplicateViews),
-                overlap: kept(KeepItem::Overlap),
-                silhouette_edge: kept(KeepItem::SilhouetteEdge),
-                floaters: kept(KeepItem::Floaters),
-                sh_bands: kept(KeepItem::ShBands),
-            },
-            check: true,
-            photo: !self.no_photo,
-            budget_s: self.budget,
-            resolution: self.resolution,
-            max_views: self.max_views,
-            max_gaussians: Some(self.max_gaussians),
             threads: self.threads,
-            points: false,
             refine: self.refine.map(|amount| RefineOptions {
                 amount,
                 hold_out: self.refine_hold_out,
@@ -233,6 +160,7 @@ impl MethodArgs {
                 backend: self.refine_backend,
                 ..RefineOptions::default()
             }),
+            ..table.options.clone()
         }
     }
 
@@ -248,39 +176,10 @@ impl MethodArgs {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Prior {
-    Auto,
-    Given,
-    Hull,
-    Shape,
-    Onnx,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum RunsOn {
     Cpu,
     Cuda,
     Auto,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Symmetry {
-    Auto,
-    Always,
-    Never,
-    Flip,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Relit {
-    Auto,
-    Never,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Calibration {
-    Auto,
-    Off,
 }
 
 /// Methods for comparison.
@@ -288,15 +187,4 @@ enum Calibration {
 enum Baseline {
     #[value(name = "3dgs")]
     GaussianSplatting,
-}
-
-/// The fields of [`Keep`].
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum KeepItem {
-    DuplicateViews,
-    Overlap,
-    SilhouetteEdge,
-    Floaters,
-    ShBands,
-    All,
 }

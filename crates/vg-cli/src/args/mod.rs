@@ -1,9 +1,12 @@
 //! The command line: commands and their options.
 
 mod align;
+#[cfg(test)]
+mod documented;
 mod eval;
 mod method;
 mod report;
+mod settings;
 mod values;
 
 pub(crate) use align::{AlignArgs, Mode};
@@ -13,7 +16,7 @@ pub(crate) use report::ReportArgs;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
-use values::{Names, backend, background, names, picture_size, positive, refinement};
+use values::{Names, background, choice, names, picture_size, positive, refinement};
 use vg::refine::Amount;
 use vg::render::{Backend, Background};
 
@@ -165,7 +168,7 @@ pub(crate) struct RefineArgs {
     #[arg(long)]
     pub(crate) densify: bool,
     /// Device for rendering and gradients: cpu, gpu (in a build with GPU support), or auto, at present the CPU
-    #[arg(long, value_name = "auto|cpu|gpu", default_value = "auto", value_parser = backend)]
+    #[arg(long, default_value = "auto", value_parser = choice::<Backend>())]
     pub(crate) backend: Backend,
     /// Worker threads; 0 means one per core
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -204,7 +207,7 @@ pub(crate) struct RenderArgs {
     #[arg(long)]
     pub(crate) depth: bool,
     /// Renderer: cpu, gpu, or auto, the best that this build and this machine have
-    #[arg(long, value_name = "auto|cpu|gpu", default_value = "auto", value_parser = backend)]
+    #[arg(long, default_value = "auto", value_parser = choice::<Backend>())]
     pub(crate) backend: Backend,
     /// Worker threads; 0 means one per core
     #[arg(long, value_name = "N", default_value_t = 0)]

@@ -1,8 +1,10 @@
 //! Parsers of command-line values that are more than a number or a name.
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use vg::geometry::Choice;
 use vg::pipeline::Options;
 use vg::refine::{Amount, RefineOptions};
-use vg::render::{Backend, Background};
+use vg::render::Background;
 use vg::scene::{Place, VehicleBox};
 
 /// Length, width, height in metres. A type of its own because clap treats an array as a list of values.
@@ -78,13 +80,10 @@ pub(super) fn background(text: &str) -> Result<Background, String> {
     }
 }
 
-pub(super) fn backend(text: &str) -> Result<Backend, String> {
-    match text {
-        "auto" => Ok(Backend::Auto),
-        "cpu" => Ok(Backend::Cpu),
-        "gpu" => Ok(Backend::Gpu),
-        _ => Err("expected auto, cpu or gpu".into()),
-    }
+/// One of an enumeration, by name.
+pub(super) fn choice<T: Choice + Send + Sync>() -> impl TypedValueParser<Value = T> {
+    let names = PossibleValuesParser::new(T::ALL.iter().map(|choice| choice.variant().name));
+    names.try_map(|name| T::from_name("", &name))
 }
 
 /// Three numbers separated by commas.
@@ -119,15 +118,6 @@ pub(super) fn refinement(text: &str) -> Result<Amount, String> {
         Err(vg::Error::Argument { allowed, .. }) => Err(format!("expected {allowed}")),
         Err(other) => Err(other.to_string()),
     }
-}
-
-pub(super) fn share(text: &str) -> Result<f64, String> {
-    let inside = |share: &f64| *share > 0.0 && *share <= 1.0;
-    text.parse().ok().filter(inside).ok_or_else(|| "expected a number above 0 and at most 1".into())
-}
-
-pub(super) fn at_least_one(text: &str) -> Result<usize, String> {
-    text.parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above 0".into())
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use crate::job::{Failure, Result, USAGE};
 use crate::scene;
 use std::path::{Path, PathBuf};
 use vg::imports::{self, Up};
-use vg::io::ply;
+use vg::io::splats;
 use vg::progress::Threads;
 use vg::scene::Cloud;
 use vg::{Gaussians, View};
@@ -132,6 +132,6 @@ fn read_views(path: &Path, views: &[View], vehicle: &Vehicle) -> Result<Gaussian
 }
 
 fn read(path: &Path) -> Result<Gaussians> {
-    let (gaussians, _) = ply::read(path)?;
+    let (gaussians, _) = splats::read(path)?;
     Ok(gaussians)
 }

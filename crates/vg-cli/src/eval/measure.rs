@@ -227,7 +227,7 @@ pub(crate) fn mean(all: &[&Measured]) -> Option<Measured> {
         prior: if same_prior { all[0].prior.clone() } else { "mixed".into() },
         errors,
         lpips: mean_of(all.iter().filter_map(|m| m.lpips)),
-        surface: mean_surface(&all.iter().filter_map(|m| m.surface).collect::<Vec<_>>()),
+        surface: SurfaceErrors::mean(&all.iter().filter_map(|m| m.surface).collect::<Vec<_>>()),
         input_psnr_db: mean_of(all.iter().filter_map(|m| m.input_psnr_db)),
         input_ssim: mean_of(all.iter().filter_map(|m| m.input_ssim)),
         input_depth_mae_m: mean_of(all.iter().filter_map(|m| m.input_depth_mae_m)),
@@ -244,20 +244,4 @@ pub(crate) fn mean(all: &[&Measured]) -> Option<Measured> {
 fn mean_of(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (sum, n) = values.fold((0.0, 0.0), |(sum, n), value| (sum + value, n + 1.0));
     (n > 0.0).then(|| sum / n)
-}
-
-/// Means of the surface errors; for the size errors, means of their absolute values.
-fn mean_surface(all: &[SurfaceErrors]) -> Option<SurfaceErrors> {
-    let of = |get: fn(&SurfaceErrors) -> f64| mean_of(all.iter().map(get));
-    Some(SurfaceErrors {
-        accuracy_m: of(|s| s.accuracy_m)?,
-        completeness_m: of(|s| s.completeness_m)?,
-        chamfer_m: of(|s| s.chamfer_m)?,
-        precision: of(|s| s.precision)?,
-        recall: of(|s| s.recall)?,
-        f_score: of(|s| s.f_score)?,
-        length_error_percent: of(|s| s.length_error_percent.abs())?,
-        width_error_percent: of(|s| s.width_error_percent.abs())?,
-        height_error_percent: of(|s| s.height_error_percent.abs())?,
-    })
 }

@@ -5,24 +5,60 @@ use super::measure::Measured;
 use crate::grid::{Column, Grid, number};
 use crate::shown;
 use Column::{Numbers, Rare, Words};
+use vg::geometry::measures::Measure;
+use vg::metrics::{SurfaceErrors, ViewErrors};
+
+/// The column of a measure; `None` where a table leaves it out.
+type ColumnOf = fn(&Measure) -> Option<Column>;
+
+/// The entries that stand behind a measure.
+fn of_measure<T: Clone>(entries: &[(&str, T)], name: &str) -> Vec<T> {
+    entries.iter().filter(|entry| entry.0 == name).map(|entry| entry.1.clone()).collect()
+}
+
+/// Columns of measures, and others behind some of them.
+fn columns(measures: &[Measure], column_of: ColumnOf, behind: &[(&str, Column)]) -> Vec<Column> {
+    let known = measures.iter().filter_map(|measure| Some((measure, column_of(measure)?)));
+    known.flat_map(|(measure, column)| std::iter::once(column).chain(of_measure(behind, measure.name))).collect()
+}
+
+/// The cells of those columns; without values, empty ones.
+fn cells(
+    measures: &[Measure],
+    values: Option<Vec<Option<f64>>>,
+    column_of: ColumnOf,
+    behind: &[(&str, String)],
+) -> Vec<String> {
+    let values = values.unwrap_or_else(|| vec![None; measures.len()]);
+    let known = measures.iter().zip(values).filter(|(measure, _)| column_of(measure).is_some());
+    let number = |measure: &Measure, value| number(value, measure.digits.into());
+    known
+        .flat_map(|(measure, value)| std::iter::once(number(measure, value)).chain(of_measure(behind, measure.name)))
+        .collect()
+}
+
+fn of_view(measure: &Measure) -> Option<Column> {
+    (!measure.title.is_empty()).then_some(Numbers(measure.title))
+}
+
+fn of_views_in_short(measure: &Measure) -> Option<Column> {
+    match measure.name {
+        "psnr_box_db" => None,
+        "psnr_db" | "ssim" | "silhouette_iou" => Some(Numbers(measure.title)),
+        _ => of_surface(measure),
+    }
+}
+
+fn of_surface(measure: &Measure) -> Option<Column> {
+    (!measure.title.is_empty()).then_some(Rare(measure.title))
+}
 
 /// A table with a row for each split and a row for the mean.
 pub(crate) fn by_split<'a>(rows: impl IntoIterator<Item = (&'a str, &'a str, &'a Measured)>) -> Grid {
-    let mut grid = Grid::new(&[
-        Words("scene"),
-        Words("split"),
-        Words("prior"),
-        Numbers("PSNR dB"),
-        Numbers("SSIM"),
-        Rare("LPIPS"),
-        Numbers("PSNR box"),
-        Numbers("IoU"),
-        Numbers("depth MAE m"),
-        Rare("Chamfer m"),
-        Rare("F 5 cm"),
-        Rare("length %"),
-        Rare("width %"),
-        Rare("height %"),
+    let mut headings = vec![Words("scene"), Words("split"), Words("prior")];
+    headings.extend(columns(ViewErrors::MEASURES, of_view, &[("ssim", Rare("LPIPS"))]));
+    headings.extend(columns(SurfaceErrors::MEASURES, of_surface, &[]));
+    headings.extend([
         Rare("in. PSNR dB"),
         Rare("in. depth MAE m"),
         Rare("p90"),
@@ -30,23 +66,13 @@ pub(crate) fn by_split<'a>(rows: impl IntoIterator<Item = (&'a str, &'a str, &'a
         Numbers("render ms"),
         Numbers("Gaussians"),
     ]);
+    let mut grid = Grid::new(&headings);
     for (scene, split, m) in rows {
-        let [chamfer, f_score, length, width, height] = surface(m);
-        grid.push([
-            scene.into(),
-            split.into(),
-            m.prior.clone(),
-            number(Some(m.errors.psnr_db), 3),
-            number(m.errors.ssim, 4),
-            number(m.lpips, 4),
-            number(m.errors.psnr_box_db, 3),
-            number(Some(m.errors.silhouette_iou), 4),
-            number(m.errors.depth_mae_m, 4),
-            chamfer,
-            f_score,
-            length,
-            width,
-            height,
+        let mut row = vec![scene.to_owned(), split.to_owned(), m.prior.clone()];
+        let lpips = ("ssim", number(m.lpips, 4));
+        row.extend(cells(ViewErrors::MEASURES, Some(m.errors.values()), of_view, &[lpips]));
+        row.extend(cells(SurfaceErrors::MEASURES, m.surface.map(|s| s.values()), of_surface, &[]));
+        row.extend([
             number(m.input_psnr_db, 3),
             number(m.input_depth_mae_m, 4),
             number(m.input_depth_p90_m, 4),
@@ -54,26 +80,18 @@ pub(crate) fn by_split<'a>(rows: impl IntoIterator<Item = (&'a str, &'a str, &'a
             number(Some(m.render_ms), 2),
             format!("{:.0}", m.gaussians),
         ]);
+        grid.push(row);
     }
     grid
 }
 
 /// A table with a row for each system. With `beside`, also the differences to the first row: dB, seconds, MiB.
 pub(crate) fn by_system(rows: &[Row], beside: bool) -> Grid {
-    let mut grid = Grid::new(&[
-        Words("system"),
-        Numbers("splits"),
-        Numbers("PSNR dB"),
-        Rare("+-"),
-        Numbers("SSIM"),
-        Rare("LPIPS"),
-        Numbers("IoU"),
-        Rare("depth MAE m"),
-        Rare("Chamfer m"),
-        Rare("F 5 cm"),
-        Rare("length %"),
-        Rare("width %"),
-        Rare("height %"),
+    let mut headings = vec![Words("system"), Numbers("splits")];
+    let behind = [("psnr_db", Rare("+-")), ("ssim", Rare("LPIPS"))];
+    headings.extend(columns(ViewErrors::MEASURES, of_views_in_short, &behind));
+    headings.extend(columns(SurfaceErrors::MEASURES, of_surface, &[]));
+    headings.extend([
         Rare("in. PSNR dB"),
         Numbers("seconds"),
         Rare("least"),
@@ -84,6 +102,7 @@ pub(crate) fn by_system(rows: &[Row], beside: bool) -> Grid {
         Rare("s more"),
         Rare("MiB more"),
     ]);
+    let mut grid = Grid::new(&headings);
     let first = rows.first().filter(|_| beside);
     for row in rows {
         let m = row.mean.as_ref();
@@ -91,22 +110,14 @@ pub(crate) fn by_system(rows: &[Row], beside: bool) -> Grid {
         let mib = |row: &Row| row.peak_bytes.map(|bytes| bytes as f64 / f64::from(1 << 20));
         let psnr = |row: &Row| row.mean.as_ref().map(|m| m.errors.psnr_db);
         let more = |get: &dyn Fn(&Row) -> Option<f64>| Some(get(row)? - get(first?)?);
-        let [chamfer, f_score, length, width, height] =
-            m.map_or_else(|| [(); 5].map(|()| number(None, 0)), surface);
-        grid.push([
-            row.system.clone(),
-            row.splits.to_string(),
-            number(psnr(row), 3),
-            number(row.psnr_standard_error_db, 3),
-            number(of(&|m| m.errors.ssim), 4),
-            number(of(&|m| m.lpips), 4),
-            number(of(&|m| Some(m.errors.silhouette_iou)), 4),
-            number(of(&|m| m.errors.depth_mae_m), 4),
-            chamfer,
-            f_score,
-            length,
-            width,
-            height,
+        let mut numbers = vec![row.system.clone(), row.splits.to_string()];
+        let behind =
+            [("psnr_db", number(row.psnr_standard_error_db, 3)), ("ssim", number(of(&|m| m.lpips), 4))];
+        let errors = m.map(|m| m.errors.values());
+        numbers.extend(cells(ViewErrors::MEASURES, errors, of_views_in_short, &behind));
+        let surface = m.and_then(|m| m.surface).map(|surface| surface.values());
+        numbers.extend(cells(SurfaceErrors::MEASURES, surface, of_surface, &[]));
+        numbers.extend([
             number(of(&|m| m.input_psnr_db), 3),
             number(row.seconds, 3),
             number(row.seconds_range.map(|r| r[0]), 3),
@@ -117,21 +128,9 @@ pub(crate) fn by_system(rows: &[Row], beside: bool) -> Grid {
             number(more(&|row| row.seconds), 3),
             number(more(&mib), 0),
         ]);
+        grid.push(numbers);
     }
     grid
-}
-
-/// Chamfer distance, F-score, and errors of length, width and height.
-fn surface(m: &Measured) -> [String; 5] {
-    let of =
-        |get: fn(&vg::metrics::SurfaceErrors) -> f64, digits| number(m.surface.as_ref().map(get), digits);
-    [
-        of(|s| s.chamfer_m, 4),
-        of(|s| s.f_score, 3),
-        of(|s| s.length_error_percent, 2),
-        of(|s| s.width_error_percent, 2),
-        of(|s| s.height_error_percent, 2),
-    ]
 }
 
 /// Reasons why rows have no numbers, one line each.

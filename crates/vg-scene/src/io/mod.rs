@@ -21,6 +21,7 @@ pub mod ply;
 mod realcar;
 pub mod scene;
 mod select;
+pub mod splats;
 mod stream;
 pub mod transforms;
 pub mod vehicle_frame;

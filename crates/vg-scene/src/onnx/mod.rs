@@ -20,16 +20,18 @@ use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use vg_geometry::threads::OfProcess;
-use vg_geometry::{Error, Result};
+use vg_geometry::{Error, Result, choices};
 
-/// Execution provider of a model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Provider {
-    /// The CPU.
-    #[default]
-    Cpu,
-    /// The first CUDA device, if the runtime was built for CUDA.
-    Cuda,
+choices! {
+    /// Where a model runs.
+    #[derive(Default)]
+    pub enum Provider as "provider" {
+        /// The processor.
+        #[default]
+        Cpu = 0 "cpu",
+        /// The first CUDA device, where ONNX Runtime was built for it.
+        Cuda = 1 "cuda",
+    }
 }
 
 /// Options for opening a model.

@@ -1,21 +1,22 @@
 //! Rendering backends: the CPU's threads or a graphics processor.
 
 use super::{CpuRenderer, Differentiable};
-use serde::Serialize;
 use std::sync::Arc;
-use vg_geometry::{Error, Result};
+use vg_geometry::{Error, Result, choices};
 
-/// The requested backend.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Backend {
-    /// A graphics processor where this build and this machine have one and the scene is large enough, else the CPU.
-    #[default]
-    Auto,
-    /// The threads of the current rayon pool.
-    Cpu,
-    /// A graphics processor, or a driver that emulates one; an error without.
-    Gpu,
+choices! {
+    /// What draws.
+    #[derive(Default)]
+    pub enum Backend as "backend" {
+        /// What is best of what this build and this machine have; for a single picture the CPU.
+        #[default]
+        Auto = 0 "auto",
+        /// The context's threads.
+        Cpu = 1 "cpu",
+        /// A graphics processor, or a driver that stands in for one. [`Error::NotBuilt`] in a build without it,
+        /// [`Error::Missing`] on a machine without a driver.
+        Gpu = 2 "gpu",
+    }
 }
 
 /// The chosen backend.

@@ -1,6 +1,6 @@
 //! Render options; the defaults are those of INRIA and gsplat.
 
-use vg_geometry::{Error, Result};
+use vg_geometry::{Error, Result, choices};
 
 /// The background behind the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,13 +11,14 @@ pub enum Background {
     Transparent,
 }
 
-/// The meaning of a depth pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DepthMode {
-    /// Sum of T alpha z over alpha: metres, 0 where alpha is 0.
-    Expected,
-    /// Sum of T alpha z, not divided.
-    Accumulated,
+choices! {
+    /// What a depth pixel means.
+    pub enum DepthMode as "depth_mode" {
+        /// Expected planar depth along the optical axis in metres; 0 where alpha is 0.
+        Expected = 0 "expected",
+        /// The same times alpha: the plain sum over the Gaussians.
+        Accumulated = 1 "accumulated",
+    }
 }
 
 /// Render options; `RenderOptions::default()` is used for all measurements.

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use vg_geometry::nearest::Nearest;
 use vg_geometry::progress::{UNWATCHED, Watch};
-use vg_geometry::{Error, Result};
+use vg_geometry::{Error, Result, measures};
 use vg_scene::Cloud;
 use vg_splat::Gaussians;
 
@@ -59,27 +59,29 @@ impl SurfaceOptions {
     }
 }
 
-/// Errors of a model's surface against a scan.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct SurfaceErrors {
-    /// Mean distance from the model's surface to the scan, metres.
-    pub accuracy_m: f64,
-    /// Mean distance from the scan to the model's surface, metres.
-    pub completeness_m: f64,
-    /// Mean of accuracy and completeness, metres.
-    pub chamfer_m: f64,
-    /// Share of the model's surface nearer to the scan than the threshold.
-    pub precision: f64,
-    /// Share of the scan nearer to the model's surface than the threshold.
-    pub recall: f64,
-    /// Harmonic mean of precision and recall.
-    pub f_score: f64,
-    /// Excess of the model's length (x) over the scan's, percent of the scan's length.
-    pub length_error_percent: f64,
-    /// Excess of the model's width (y) over the scan's, percent of the scan's width.
-    pub width_error_percent: f64,
-    /// Excess of the model's height (z) over the scan's, percent of the scan's height.
-    pub height_error_percent: f64,
+measures! {
+    /// The error of a model's surface against a scan.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+    pub struct SurfaceErrors {
+        /// Mean distance from the model's surface to the scan, metres; distances above 0.5 m count as 0.5 m.
+        pub accuracy_m: f64 => ("", 4, Lower),
+        /// Mean distance from the scan to the model's surface, metres, likewise.
+        pub completeness_m: f64 => ("", 4, Lower),
+        /// Mean of the two.
+        pub chamfer_m: f64 => ("Chamfer m", 4, Lower),
+        /// Share of the model's surface that is nearer to the scan than `options.f_score_m`.
+        pub precision: f64 => ("", 3, Higher),
+        /// Share of the scan that is nearer to the model's surface than `options.f_score_m`.
+        pub recall: f64 => ("", 3, Higher),
+        /// Harmonic mean of the two.
+        pub f_score: f64 => ("F 5 cm", 3, Higher),
+        /// How much longer (x) the model is than the scan, percent; negative: shorter.
+        pub length_error_percent: f64 => ("length %", 2, NearZero),
+        /// The same of the width (y).
+        pub width_error_percent: f64 => ("width %", 2, NearZero),
+        /// The same of the height (z).
+        pub height_error_percent: f64 => ("height %", 2, NearZero),
+    }
 }
 
 /// Fraction of the work, in time, that is done once the visible surface has been rendered.

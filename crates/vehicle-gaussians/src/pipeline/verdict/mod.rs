@@ -13,20 +13,23 @@ pub(super) use rules::{Judged, judge};
 
 use serde::Serialize;
 use std::fmt;
+use vg_geometry::choices;
 
-/// Whether a reconstruction can be trusted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// No rule found a mistake.
-    #[default]
-    Good,
-    /// No rule found a mistake, but the check was switched off: the views were not compared with one another.
-    Unchecked,
-    /// A rule found a mistake; the model may still be useful.
-    Doubtful,
-    /// The input contradicts itself, or does not describe a road vehicle.
-    Bad,
+choices! {
+    /// Whether a reconstruction is to be believed.
+    #[derive(Default, PartialOrd, Ord)]
+    pub enum Verdict as "verdict" {
+        /// Nothing looks wrong.
+        #[default]
+        Good = 0 "good",
+        /// Nothing looks wrong, but [`Options::check`](super::Options::check) was `false`: views were not compared with
+        /// one another.
+        Unchecked = 1 "unchecked",
+        /// Something looks wrong; the model may still be of use.
+        Doubtful = 2 "doubtful",
+        /// The input contradicts itself, or describes no road vehicle.
+        Bad = 3 "bad",
+    }
 }
 
 /// The subject of a reason. Reports contain the names of the variants in kebab-case.

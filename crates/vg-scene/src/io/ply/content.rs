@@ -6,6 +6,7 @@ use super::points::{self, ColoredPoints};
 use super::rows;
 use super::variant::{Variant, holds_splats};
 use crate::io::stream;
+use std::io::BufRead;
 use std::path::Path;
 use vg_geometry::Result;
 use vg_splat::Gaussians;
@@ -37,7 +38,12 @@ pub struct OtherGaussians {
 /// Reads a PLY file of any content in one pass; the file may be a pipe.
 pub fn read_content(path: &Path) -> Result<Content> {
     let stream = stream::open(path)?;
-    let (header, input) = header::open(stream.input, stream.length, path)?;
+    content(stream.input, stream.length, path)
+}
+
+/// Reads the content of an open source.
+pub(in crate::io) fn content(input: impl BufRead, length: Option<u64>, path: &Path) -> Result<Content> {
+    let (header, input) = header::open(input, length, path)?;
     match Layout::from_header(&header, path) {
         Ok(layout) => {
             gaussians::read_rows(input, &header, &layout, path).map(|(g, n)| Content::Gaussians(g, n))
@@ -53,11 +59,7 @@ pub fn read_content(path: &Path) -> Result<Content> {
     }
 }
 
-fn bounds(
-    input: impl std::io::BufRead,
-    header: &Header,
-    path: &Path,
-) -> Result<Option<([f32; 3], [f32; 3])>> {
+fn bounds(input: impl BufRead, header: &Header, path: &Path) -> Result<Option<([f32; 3], [f32; 3])>> {
     let [Some(x), Some(y), Some(z)] = ["x", "y", "z"].map(|name| header.find(name)) else { return Ok(None) };
     let mut bounds: Option<([f32; 3], [f32; 3])> = None;
     rows::for_each(input, header, path, |_, row| {

@@ -9,6 +9,7 @@ use super::header::{self, Header, Property};
 use super::rows::{self, finite};
 use super::variant::Variant;
 use crate::io::files::write_atomically;
+use crate::io::splats::SplatFormat;
 use crate::io::stream;
 use std::io::{BufRead, Write};
 use std::path::Path;
@@ -31,6 +32,15 @@ pub struct PlyNotes {
     /// Vertex properties that were ignored, in the file's order, except normals.
     pub ignored: Vec<String>,
 }
+
+/// PLY among the formats of models.
+pub const FORMAT: SplatFormat = SplatFormat {
+    name: "PLY",
+    endings: &["ply"],
+    recognizes: |first| first.starts_with(b"ply"),
+    read: |input, length, path| read_stream(input, length, path),
+    write: write_to,
+};
 
 /// Reads the Gaussians in a PLY file. Properties may have any order and any scalar type, with others between. The file
 /// may be a pipe: it is read once, from start to end. Other formats, and Gaussians of other kinds, are errors that name
