@@ -569,7 +569,9 @@ fn each_enumerator_means_its_namesake_in_rust() {
             Err(other) => panic!("{other}"),
         }
     }
-    held.all("vg_heading", |n| vg_align_options { heading: n, ..vg_align_options::initial() }.heading().unwrap());
+    held.all("vg_heading", |n| {
+        vg_align_options { heading: n, ..vg_align_options::initial() }.heading().unwrap()
+    });
     for model in CameraModel::ALL {
         let named = [
             vg_camera_model::SimplePinhole,
