@@ -52,7 +52,7 @@ pub(crate) struct MethodArgs {
     #[arg(long, requires = "refine", default_value = "auto", value_parser = choice::<Backend>())]
     refine_backend: Backend,
     /// Fit another method to the input views instead, for comparison: 3D Gaussian splatting from a random start or from
-    /// --cloud, without any prior; --refine tells how long (2000)
+    /// --cloud, without any prior; --refine tells how long (2000), and --sh-degree is 3 if it is not given
     #[arg(long, value_enum, value_name = "METHOD", conflicts_with_all = NOT_OF_A_BASELINE)]
     baseline: Option<Baseline>,
     /// Worker threads; 0 means one per core
