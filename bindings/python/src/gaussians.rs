@@ -21,8 +21,7 @@ use vg::io::{ply, splats};
 use vg::progress::Watch;
 use vg::render::backend::{Trainer, trainer};
 use vg::render::{
-    Backend, Background, CpuRenderer, Differentiable, PictureGradient, RenderOptions, Rendered,
-    Renderer,
+    Backend, Background, CpuRenderer, Differentiable, PictureGradient, RenderOptions, Rendered, Renderer,
 };
 
 /// Draws for everybody: keeps its working memory, and the last lens, from picture to picture.

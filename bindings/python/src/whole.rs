@@ -56,7 +56,11 @@ fn given<'py, T>(
 }
 
 /// A whole number of any argument.
-pub(crate) fn whole<T: TryFrom<u64>>(object: &Bound<'_, PyAny>, argument: &str, allowed: &str) -> PyResult<T> {
+pub(crate) fn whole<T: TryFrom<u64>>(
+    object: &Bound<'_, PyAny>,
+    argument: &str,
+    allowed: &str,
+) -> PyResult<T> {
     if let Some(number) = object.extract::<u64>().ok().and_then(|number| T::try_from(number).ok()) {
         return Ok(number);
     }
