@@ -380,20 +380,10 @@ fn each_measure_of_a_view_and_of_two_pictures_equals_its_namesake_in_rust() {
     assert_eq!(status, vg_status::Ok);
     let drawn = CpuRenderer::new().render(&car.rust, &view.camera, &RenderOptions::default()).unwrap();
     let expected = ViewErrors::of(&drawn, &view);
-    assert_measures(
-        "vg_view_errors",
-        &out,
-        &[
-            ("psnr_db", Some(expected.psnr_db)),
-            ("psnr_box_db", expected.psnr_box_db),
-            ("ssim", expected.ssim),
-            // Without a network.
-            ("lpips", None),
-            ("silhouette_iou", Some(expected.silhouette_iou)),
-            ("depth_mae_m", expected.depth_mae_m),
-            ("depth_p90_m", expected.depth_p90_m),
-        ],
-    );
+    let measures = ViewErrors::MEASURES.iter().map(|measure| measure.name).zip(expected.values());
+    // Without a network.
+    let measures: Vec<_> = measures.chain([("lpips", None)]).collect();
+    assert_measures("vg_view_errors", &out, &measures);
     assert_all_different(&doubles("vg_view_errors", &out));
 
     let (width, height) = (view.camera.width, view.camera.height);

@@ -236,9 +236,9 @@ setting!(
     }
 );
 
-/// Defines a struct of options: a default after each field, and what else is known of it ([`Facts`]). Makes the struct, its
-/// `Default`, and `fields`, `set` and `check_ranges`. A field without facts is of a kind that each face has in a form of
-/// its own, and is no part of the table.
+/// Defines a struct of options: a default after each field, and what else is known of it ([`Facts`]). Makes the struct,
+/// its `Default`, and `fields`, `set` and `check_ranges`. A field without facts is of a kind that each face has in a
+/// form of its own, and is no part of the table.
 ///
 /// ```
 /// use vg_geometry::options::{Range, Value};

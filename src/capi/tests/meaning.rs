@@ -105,7 +105,8 @@ fn each_option_of_a_reconstruction_sets_its_namesake() {
             |r| format!("{:?}", refinement(r).backend) == "Cpu",
         ),
     ];
-    // Options of the table are in the next test; `cloud` is below; callbacks are called by the client of each release, models by the tests of networks.
+    // Options of the table are in the next test; `cloud` is below; callbacks are called by the client of each release,
+    // models by the tests of networks.
     let elsewhere = [
         "struct_size",
         "context",

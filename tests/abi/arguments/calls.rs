@@ -1564,16 +1564,10 @@ fn bits_of(option: &TableField) -> u64 {
 
 /// Options of the table that are not named here: what their kind and range allow, where the golden layout has them.
 fn newer_options(known: &[Field]) -> Vec<Field> {
-    let layout = std::fs::read_to_string(golden().join("layout_x86_64.txt")).unwrap();
-    let place = |name: &str| -> (usize, usize) {
-        let line = layout.lines().find_map(|line| line.strip_prefix(&format!("vg_options.{name} at ")));
-        let (at, size) = line.and_then(|line| line.split_once(" size ")).expect("a field of vg_options");
-        (at.parse().unwrap(), size.parse().unwrap())
-    };
+    let layout = filled("vg_options");
     let newer = table().into_iter().filter(|option| known.iter().all(|field| field.name != option.name));
     newer
         .map(|option| {
-            let (offset, size) = place(option.name);
             let numbers =
                 |e: fn() -> Enumeration| e().variants.iter().map(|v| v.number).collect::<Vec<i32>>();
             let tries = match option.kind {
@@ -1585,7 +1579,8 @@ fn newer_options(known: &[Field]) -> Vec<Field> {
                 Kind::Whole | Kind::MaybeWhole => vec![(bits_of(&option), Fine)],
                 Kind::Real | Kind::MaybeReal => vec![(bits_of(&option), Fine), (f64::NAN.to_bits(), Refused)],
             };
-            Field { name: option.name.into(), word: option.name.into(), offset, size, count: 1, tries }
+            let place = layout.iter().find(|field| field.name == option.name).expect("a field of vg_options");
+            Field { tries, ..place.clone() }
         })
         .collect()
 }
@@ -1989,44 +1984,29 @@ fn metrics_options(context: usize) -> Lent {
     lent
 }
 
+/// The fields of a struct in the golden layout, which a call fills.
+fn filled(of: &str) -> Vec<Field> {
+    let layout = std::fs::read_to_string(golden().join("layout_x86_64.txt")).unwrap();
+    let lines = layout.lines().filter_map(|line| line.strip_prefix(of)?.strip_prefix('.'));
+    let field = |line: &str| {
+        let (name, place) = line.split_once(" at ")?;
+        let (offset, size) = place.split_once(" size ")?;
+        let (offset, size) = (offset.parse().ok()?, size.parse().ok()?);
+        Some(Field { name: name.into(), word: name.into(), offset, size, count: 1, tries: elsewhere() })
+    };
+    lines.filter_map(field).collect()
+}
+
 fn picture_errors() -> Lent {
-    let fields = fields!(vg_picture_errors {
-        struct_size: elsewhere(),
-        psnr_db: elsewhere(),
-        ssim: elsewhere(),
-        lpips: elsewhere(),
-    });
-    Lent::zeroed::<vg_picture_errors>("vg_picture_errors", fields)
+    Lent::zeroed::<vg_picture_errors>("vg_picture_errors", filled("vg_picture_errors"))
 }
 
 fn view_errors() -> Lent {
-    let fields = fields!(vg_view_errors {
-        struct_size: elsewhere(),
-        psnr_db: elsewhere(),
-        psnr_box_db: elsewhere(),
-        ssim: elsewhere(),
-        lpips: elsewhere(),
-        silhouette_iou: elsewhere(),
-        depth_mae_m: elsewhere(),
-        depth_p90_m: elsewhere(),
-    });
-    Lent::zeroed::<vg_view_errors>("vg_view_errors", fields)
+    Lent::zeroed::<vg_view_errors>("vg_view_errors", filled("vg_view_errors"))
 }
 
 fn surface_errors() -> Lent {
-    let fields = fields!(vg_surface_errors {
-        struct_size: elsewhere(),
-        accuracy_m: elsewhere(),
-        completeness_m: elsewhere(),
-        chamfer_m: elsewhere(),
-        precision: elsewhere(),
-        recall: elsewhere(),
-        f_score: elsewhere(),
-        length_error_percent: elsewhere(),
-        width_error_percent: elsewhere(),
-        height_error_percent: elsewhere(),
-    });
-    Lent::zeroed::<vg_surface_errors>("vg_surface_errors", fields)
+    Lent::zeroed::<vg_surface_errors>("vg_surface_errors", filled("vg_surface_errors"))
 }
 
 /// Two photographs, one with gaps between its rows and one with alpha, at odd addresses.

@@ -16,8 +16,8 @@ choices! {
     #[derive(Default, Deserialize)]
     #[serde(rename_all = "lowercase")]
     pub enum PriorChoice as "prior" {
-        /// [`PriorChoice::Given`] if every used view has depth, else [`PriorChoice::Shape`]. Where some views have depth,
-        /// it counts as measured points, to which the shape bends, and `log` is told.
+        /// [`PriorChoice::Given`] if every used view has depth, else [`PriorChoice::Shape`]. Where some views have
+        /// depth, it counts as measured points, to which the shape bends, and `log` is told.
         #[default]
         Auto = 0 "auto",
         /// The depth in the views.
@@ -171,8 +171,8 @@ options! {
         pub photo: bool = true => {
             help: "Correct the shape prior's surface by photo-consistency",
         },
-        /// Seconds the call may take, above 0, where that matters: what is left out is then chosen to fit. `None`: as long
-        /// as it takes.
+        /// Seconds the call may take, above 0, where that matters: what is left out is then chosen to fit. `None`: as
+        /// long as it takes.
         pub budget_s: Option<f64> = None => {
             help: "Time limit of the reconstruction in seconds; steps that do not fit are left out",
             range: Some(Range::above(0.0, f64::MAX, "seconds above 0")),
@@ -180,24 +180,24 @@ options! {
             none: Some("as long as it takes"),
             value_name: Some("SECONDS"),
         },
-        /// Views are first resampled to this share of their width and height, above 0, at most 1. A `budget_s` may choose
-        /// less.
+        /// Views are first resampled to this share of their width and height, above 0, at most 1. A `budget_s` may
+        /// choose less.
         pub resolution: f64 = 1.0 => {
             help: "Resample the views first to this fraction of their width and height; a budget may choose less",
             range: Some(Range::above(0.0, 1.0, "above 0, at most 1")),
             value_name: Some("SHARE"),
         },
-        /// At most this many views are used, those that spread best around the vehicle; `None`: all. A `budget_s` may choose
-        /// fewer.
+        /// At most this many views are used, those that spread best around the vehicle; `None`: all. A `budget_s` may
+        /// choose fewer.
         pub max_views: Option<usize> = None => {
             help: "Use at most this many views, chosen to spread best around the vehicle; a budget may choose fewer",
             range: Some(Range::closed(1.0, f64::MAX, "at least 1")),
             none: Some("all"),
         },
-        /// Most Gaussians that the model may have by what the masks of the used views say of its size: twice their vehicle
-        /// pixels, or six times those of the largest mask, whichever is less. Where that is more, the views are resampled to
-        /// fewer pixels before the work, and the log and the report say so. `None`: any number. Default 12000000, whose PLY
-        /// file would have 2 GB.
+        /// Most Gaussians that the model may have by what the masks of the used views say of its size: twice their
+        /// vehicle pixels, or six times those of the largest mask, whichever is less. Where that is more, the views are
+        /// resampled to fewer pixels before the work, and the log and the report say so. `None`: any number. Default
+        /// 12000000, whose PLY file would have 2 GB.
         pub max_gaussians: Option<usize> = Some(DEFAULT_MAX_GAUSSIANS) => {
             help: "Largest number of Gaussians, estimated from the masks; where they would give more, the views are \
                    resampled to fewer pixels, and the report says so",

@@ -84,6 +84,7 @@ fn the_measures_of_c_are_the_librarys() {
 #[test]
 fn the_measures_of_python_are_the_librarys() {
     assert_in_step("bindings/python/python/vehicle_gaussians/_measures.py", python::measures);
+    assert_in_step("bindings/python/python/vehicle_gaussians/_evaluate.py", python::scores);
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use crate::c::by_number;
 use crate::text::{Entry, Named, camel, merged, named_line, paragraph, shouted, within, wrapped};
 use vg::geometry::choice::Enumeration;
+use vg::geometry::measures::Measure;
 use vg::geometry::options::{Face, Field, Kind, Value};
 
 /// Everything of a set.
@@ -230,28 +231,34 @@ fn set(field: &Field) -> String {
     format!("    options.{} = {value}\n", field.name)
 }
 
+/// `_evaluate.py`: the row of a view.
+pub(crate) fn scores(source: &str) -> String {
+    tuple(source, "ViewScore", crate::MEASURES[0].2)
+}
+
 /// `_measures.py`: the tuples of measures.
 pub(crate) fn measures(source: &str) -> String {
-    let mut source = source.to_owned();
-    for (name, _, measures) in crate::MEASURES {
-        let fields: Vec<Entry> = measures
-            .iter()
-            .map(|measure| {
-                let kind = if measure.may_lack { "float | None" } else { "float" };
-                let doc = paragraph(measure.doc)
-                    .replace("options.", "")
-                    .replace("f_score_m", "f_score")
-                    .replace('`', "");
-                let doc = wrapped(&format!("{doc}\"\"\""), "    \"\"\"", "    ");
-                Entry::new(measure.name, format!("    {}: {kind}\n{doc}", measure.name))
-            })
-            .collect();
-        let at = source.find(&format!("class {name}(NamedTuple):\n")).unwrap();
-        let start = source[at..].find("\"\"\"\n\n").unwrap() + at + 5;
-        let end = source[start..].find("\n\n").map_or(source.len(), |n| start + n + 1);
-        let changed =
-            merged(&source[start..end], |line| named_line(line, "    "), Named::First, &fields, None);
-        source.replace_range(start..end, &changed);
-    }
-    source
+    crate::MEASURES
+        .iter()
+        .fold(source.to_owned(), |source, (name, _, measures)| tuple(&source, name, measures))
+}
+
+/// A tuple with its measures.
+fn tuple(source: &str, name: &str, measures: &[Measure]) -> String {
+    let entry = |measure: &Measure| {
+        let kind = if measure.may_lack { "float | None" } else { "float" };
+        let doc =
+            paragraph(measure.doc).replace("options.", "").replace("f_score_m", "f_score").replace('`', "");
+        let doc = wrapped(&format!("{doc}\"\"\""), "    \"\"\"", "    ");
+        Entry::new(measure.name, format!("    {}: {kind}\n{doc}", measure.name))
+    };
+    let wanted: Vec<Entry> = measures.iter().map(entry).collect();
+    let at = source.find(&format!("class {name}(NamedTuple):\n")).unwrap();
+    let start = at + source[at..].find("\"\"\"\n\n").unwrap() + 5;
+    let end = source[start..].find("\n\n").map_or(source.len(), |n| start + n + 1);
+    // Not a line that goes on with "metres, ...".
+    let declared =
+        |line: &str| named_line(line, "    ").filter(|_| line.contains(": float") || line.contains(": str"));
+    let list = merged(&source[start..end], declared, Named::First, &wanted, None);
+    format!("{}{list}{}", &source[..start], &source[end..])
 }

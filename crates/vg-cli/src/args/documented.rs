@@ -64,7 +64,7 @@ fn meaning(arg: &Arg) -> String {
     if arg.get_action().takes_values() && !defaults.is_empty() && !defaults[0].is_empty() {
         let _ = write!(meaning, " (default `{}`)", defaults[0].to_string_lossy());
     }
-    meaning.replace('|', "\\|")
+    meaning.replace('|', "\\|").replace('<', "&lt;")
 }
 
 #[test]

@@ -52,7 +52,8 @@ pub(crate) struct MethodArgs {
     #[arg(long, requires = "refine", default_value = "auto", value_parser = choice::<Backend>())]
     refine_backend: Backend,
     /// Fit another method to the input views instead, for comparison: 3D Gaussian splatting from a random start or from
-    /// --cloud, without any prior; --refine sets the number of steps (2000) or seconds
+    /// --cloud, without any prior; --refine sets the number of steps (2000) or seconds, and
+    /// --sh-degree is 3 if it is not given
     #[arg(long, value_enum, value_name = "METHOD", conflicts_with_all = CONFLICTS_WITH_BASELINE)]
     baseline: Option<Baseline>,
     /// Worker threads; 0 means one per core

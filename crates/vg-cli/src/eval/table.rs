@@ -11,15 +11,16 @@ use vg::metrics::{SurfaceErrors, ViewErrors};
 /// The column of a measure; `None` where a table leaves it out.
 type ColumnOf = fn(&Measure) -> Option<Column>;
 
-/// The entries that stand behind a measure.
-fn of_measure<T: Clone>(entries: &[(&str, T)], name: &str) -> Vec<T> {
-    entries.iter().filter(|entry| entry.0 == name).map(|entry| entry.1.clone()).collect()
-}
-
 /// Columns of measures, and others behind some of them.
 fn columns(measures: &[Measure], column_of: ColumnOf, behind: &[(&str, Column)]) -> Vec<Column> {
-    let known = measures.iter().filter_map(|measure| Some((measure, column_of(measure)?)));
-    known.flat_map(|(measure, column)| std::iter::once(column).chain(of_measure(behind, measure.name))).collect()
+    let mut columns = Vec::new();
+    for measure in measures {
+        if let Some(column) = column_of(measure) {
+            columns.push(column);
+            columns.extend(behind.iter().filter(|other| other.0 == measure.name).map(|other| other.1));
+        }
+    }
+    columns
 }
 
 /// The cells of those columns; without values, empty ones.
@@ -30,11 +31,14 @@ fn cells(
     behind: &[(&str, String)],
 ) -> Vec<String> {
     let values = values.unwrap_or_else(|| vec![None; measures.len()]);
-    let known = measures.iter().zip(values).filter(|(measure, _)| column_of(measure).is_some());
-    let number = |measure: &Measure, value| number(value, measure.digits.into());
-    known
-        .flat_map(|(measure, value)| std::iter::once(number(measure, value)).chain(of_measure(behind, measure.name)))
-        .collect()
+    let mut cells = Vec::new();
+    for (measure, value) in measures.iter().zip(values) {
+        if column_of(measure).is_some() {
+            cells.push(number(value, measure.digits.into()));
+            cells.extend(behind.iter().filter(|other| other.0 == measure.name).map(|other| other.1.clone()));
+        }
+    }
+    cells
 }
 
 fn of_view(measure: &Measure) -> Option<Column> {
