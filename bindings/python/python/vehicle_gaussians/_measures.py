@@ -47,17 +47,17 @@ class SurfaceErrors(NamedTuple):
     accuracy_m: float
     """Mean distance from the model's surface to the scan, metres; distances above 0.5 m count as 0.5 m."""
     completeness_m: float
-    """Mean distance from the scan to the model's surface, metres; distances above 0.5 m count as 0.5 m."""
+    """Mean distance from the scan to the model's surface, metres, likewise."""
     chamfer_m: float
-    """Mean of accuracy_m and completeness_m."""
+    """Mean of the two."""
     precision: float
     """Share of the model's surface that is nearer to the scan than f_score."""
     recall: float
     """Share of the scan that is nearer to the model's surface than f_score."""
     f_score: float
-    """Harmonic mean of precision and recall."""
+    """Harmonic mean of the two."""
     length_error_percent: float
-    """Error of the model's length (x) against the scan, percent; negative: shorter."""
+    """How much longer (x) the model is than the scan, percent; negative: shorter."""
     width_error_percent: float
     """The same of the width (y)."""
     height_error_percent: float

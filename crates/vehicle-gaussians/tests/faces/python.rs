@@ -66,7 +66,7 @@ pub(crate) fn reconstruct(source: &str) -> String {
         let signature = of(&|field| parameter(field, ""));
         merged(list, |line| named_line(line, "    "), Named::First, &signature, Some("threads"))
     });
-    let start = "\"\"\"Reconstructs the vehicle that the photographs show.\n";
+    let start = "\"\"\"Reconstructs the vehicle in the photographs.\n";
     let source = within(&source, start, "\n    >>> ", |list| {
         merged(list, documented, Named::First, &of(&documentation), Some("threads"))
     });
