@@ -11,10 +11,9 @@ use super::render::{Target, device, vg_alpha, vg_image_target, vg_render_options
 use super::status::{vg_error, vg_status};
 use super::watched::watched;
 use std::ffi::c_void;
-use vg::Gaussians;
 use vg::progress::Watch;
 use vg::render::{Background, Differentiable, Gradients, PictureGradient, Rendered};
-use vg::{Error, Result};
+use vg::{Error, Gaussians, Result};
 
 /// Called once on the calling thread when the picture is in `target`; fills the planes that the `vg_image_gradient`
 /// points to. Returns 0 to go on; anything else ends the call with `VG_STATUS_CANCELLED`. May call the library, with

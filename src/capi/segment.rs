@@ -7,10 +7,9 @@ use super::image::{self, extent, vg_image};
 use super::model::{self, vg_model};
 use super::read::{self, Versioned};
 use super::status::{vg_error, vg_status};
-use vg::Error;
-use vg::onnx;
 use vg::scene::mask::Label;
 use vg::scene::{Mask, Segmenter};
+use vg::{Error, onnx};
 
 /// Settings of `vg_segment`.
 #[repr(C)]

@@ -5,9 +5,8 @@ use super::guard::{guarded, guarded_value};
 use super::read;
 use super::status::{vg_error, vg_status};
 use std::ffi::c_void;
-use vg::Gaussians;
 use vg::io::ply;
-use vg::{Error, Result};
+use vg::{Error, Gaussians, Result};
 
 /// The Gaussians at these indices, in this order; an index may come again.
 ///

@@ -11,9 +11,8 @@ use std::collections::BTreeSet;
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::ptr::{null, null_mut};
 use vg_face::capi::*;
-use vg_testing::root;
 use vg_testing::tools::scratch;
-use vg_testing::vehicle;
+use vg_testing::{root, vehicle};
 
 mod calls;
 

@@ -5,8 +5,7 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
-use vg_geometry::Camera;
-use vg_geometry::{Error, Result};
+use vg_geometry::{Camera, Error, Result};
 use vg_scene::fit::Fit;
 use vg_scene::framing::{Framing, Resize};
 use vg_scene::mask::{Label, Mask};

@@ -104,7 +104,11 @@ fn a_size_of_another_vehicle_is_refused_and_one_slightly_off_gives_a_warning() {
     let [length, width, height] = true_size();
     for wrong in [[width, length, height], [0.5 * length, width, height], [2.0 * length, width, height]] {
         let error = made(wrong).unwrap_err().to_string();
-        assert!(error.starts_with("options.vehicle_size: ") && error.contains("nowhere"), "{error}");
+        assert!(
+            error.starts_with("options.vehicle_size: ")
+                && error.contains("does not fit the silhouettes anywhere"),
+            "{error}"
+        );
     }
     let report = made([length - 0.4, width, height]).unwrap().report;
     assert!(report.working_box.unwrap().contradicted_m > 0.1, "{:?}", report.working_box);

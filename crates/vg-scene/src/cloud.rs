@@ -2,8 +2,7 @@
 
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
-use vg_geometry::Similarity;
-use vg_geometry::{Error, Result};
+use vg_geometry::{Error, Result, Similarity};
 
 /// Maximum of points of a cloud.
 pub const MAX_CLOUD_POINTS: usize = 10_000_000;

@@ -6,9 +6,8 @@ use super::{DepthMap, RgbImage};
 use glam::DVec3;
 use image::imageops::{self, FilterType};
 use image::{ImageBuffer, Rgb};
-use vg_geometry::Intrinsics;
-use vg_geometry::Result;
 use vg_geometry::resample::Taps;
+use vg_geometry::{Intrinsics, Result};
 
 /// Mapping from a photograph to the network's picture: u' = scale u - offset, and v' in the same way, in pixels whose
 /// first centre is (0.5, 0.5).

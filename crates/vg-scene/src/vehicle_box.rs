@@ -1,8 +1,7 @@
 //! The vehicle's box from a tracker, an annotator or a data sheet: its size and place.
 
 use glam::{DMat3, DVec3};
-use vg_geometry::{Error, Result};
-use vg_geometry::{Pose, Similarity};
+use vg_geometry::{Error, Pose, Result, Similarity};
 
 /// Allowed sides of road vehicles and of scale models, metres.
 const SIDE_M: std::ops::RangeInclusive<f64> = 0.1..=30.0;

@@ -2,8 +2,7 @@
 
 use super::{Cloud, DepthMap, Mask, RgbImage, VehicleBox};
 use glam::Vec3;
-use vg_geometry::Camera;
-use vg_geometry::{Error, Result};
+use vg_geometry::{Camera, Error, Result};
 
 /// Maximum of views in a scene.
 pub const MAX_VIEWS: usize = 4096;

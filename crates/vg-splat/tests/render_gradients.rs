@@ -2,9 +2,8 @@
 //! passes.
 
 use glam::DVec3;
-use vg_geometry::Distortion;
 use vg_geometry::camera::Intrinsics;
-use vg_geometry::{Camera, Pose};
+use vg_geometry::{Camera, Distortion, Pose};
 use vg_splat::Gaussians;
 use vg_splat::gaussians::sh;
 use vg_splat::render::reference::Parameters;

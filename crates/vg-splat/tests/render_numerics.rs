@@ -2,9 +2,8 @@
 //! symmetries, and on difficult input.
 
 use glam::{DMat3, DVec3};
-use vg_geometry::Distortion;
 use vg_geometry::camera::Intrinsics;
-use vg_geometry::{Camera, Pose};
+use vg_geometry::{Camera, Distortion, Pose};
 use vg_splat::Gaussians;
 use vg_splat::render::{
     Background, CpuRenderer, DepthMode, Differentiable, PictureGradient, Reference, RenderOptions, Rendered,

@@ -1,8 +1,7 @@
 //! Moving a model into another frame preserves its pictures.
 
 use glam::{DMat3, DQuat, DVec3};
-use vg_geometry::Camera;
-use vg_geometry::Similarity;
+use vg_geometry::{Camera, Similarity};
 use vg_splat::Gaussians;
 use vg_splat::gaussians::sh;
 use vg_splat::render::{CpuRenderer, RenderOptions, Renderer};

@@ -6,9 +6,8 @@ use super::solve::descend;
 use glam::{DMat3, DVec3};
 use nalgebra::Matrix3;
 use rayon::prelude::*;
-use vg_geometry::Similarity;
 use vg_geometry::progress::Watch;
-use vg_geometry::{Error, Result};
+use vg_geometry::{Error, Result, Similarity};
 
 /// Headings tried for each up direction: the basin of each is wider than half the step.
 const HEADINGS: usize = 8;

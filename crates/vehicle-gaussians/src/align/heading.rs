@@ -2,8 +2,7 @@
 
 use super::WorldView;
 use glam::DVec3;
-use vg_geometry::Similarity;
-use vg_geometry::{Error, Result, choices};
+use vg_geometry::{Error, Result, Similarity, choices};
 use vg_scene::View;
 
 choices! {

@@ -25,8 +25,7 @@ pub use to_scan::{LEAST_CONFIDENCE, ScanAlignment, to_scan, to_scan_watched};
 use glam::DVec3;
 use rayon::prelude::*;
 use silhouettes::Outline;
-use vg_geometry::Pose;
-use vg_geometry::{Error, Result};
+use vg_geometry::{Error, Pose, Result};
 use vg_scene::View;
 use vg_scene::undistort::undistorted;
 

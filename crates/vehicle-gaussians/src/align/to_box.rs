@@ -6,9 +6,8 @@ use super::heading::{Heading, heading_view, is_contrary, unknown};
 use super::{candidates, check_sparse, ground, hull, nowhere, outlines};
 use glam::{DMat3, DVec2, DVec3};
 use std::f64::consts::FRAC_PI_2;
-use vg_geometry::Similarity;
 use vg_geometry::progress::{UNWATCHED, Watch};
-use vg_geometry::{Error, Result};
+use vg_geometry::{Error, Result, Similarity};
 use vg_scene::View;
 
 /// Half the side of the cube around the vehicle, in mean radii of its masks: a car's half diagonal is less than

@@ -7,9 +7,8 @@ use super::scan::Scan;
 use super::silhouettes::Outline;
 use super::{candidates, check_sparse, ground, icp, nowhere, outlines, silhouettes, solve};
 use glam::DVec3;
-use vg_geometry::Result;
-use vg_geometry::Similarity;
 use vg_geometry::progress::{UNWATCHED, Watch};
+use vg_geometry::{Result, Similarity};
 use vg_scene::{Cloud, View};
 
 /// The number of coarse alignments tried in the first rounds.

@@ -19,9 +19,8 @@ use correction::Correction;
 use rayon::prelude::*;
 use samples::Sample;
 use solve::{Free, Problem, deficit};
-use vg_geometry::Result;
 use vg_geometry::progress::Context;
-use vg_geometry::{Pose, Similarity};
+use vg_geometry::{Pose, Result, Similarity};
 use vg_scene::mask::Label;
 use vg_scene::{Mask, View};
 

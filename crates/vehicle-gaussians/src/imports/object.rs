@@ -6,9 +6,8 @@
 use crate::metrics::{on_white, psnr};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
-use vg_geometry::Similarity;
 use vg_geometry::nearest::Nearest;
-use vg_geometry::{Error, Result};
+use vg_geometry::{Error, Result, Similarity};
 use vg_scene::{Cloud, View};
 use vg_splat::Gaussians;
 use vg_splat::render::{CpuRenderer, RenderOptions, Renderer};

@@ -1,8 +1,7 @@
 //! Merges Gaussians of single photographs: keeps the vehicle's, in its frame, as one model.
 
 use glam::DVec3;
-use vg_geometry::Similarity;
-use vg_geometry::{Error, Result};
+use vg_geometry::{Error, Result, Similarity};
 use vg_scene::View;
 use vg_scene::mask::Label;
 use vg_splat::Gaussians;

@@ -6,9 +6,8 @@
 use super::run::PointCloud;
 use std::marker::PhantomData;
 use std::ops::Deref;
-use vg_geometry::Result;
-use vg_geometry::Similarity;
 use vg_geometry::progress::Context;
+use vg_geometry::{Result, Similarity};
 use vg_scene::Cloud;
 use vg_splat::Gaussians;
 

@@ -11,8 +11,7 @@ use super::{cost, outline};
 use crate::prior::volume::known_box::TELLING_M;
 use crate::prior::{BoxSource, Geometry, PointFit, WorkingBox};
 use glam::DVec3;
-use vg_geometry::Camera;
-use vg_geometry::{Error, Result};
+use vg_geometry::{Camera, Error, Result};
 use vg_scene::{Place, Scene, VehicleBox, View};
 
 /// Cameras nearer to each other than this, with the same rotation, show the same.

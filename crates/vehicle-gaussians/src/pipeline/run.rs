@@ -13,9 +13,8 @@ use super::symmetry::{self, Symmetry};
 use super::{head, pixels, refine, undistort};
 use crate::refine::Refinement;
 use glam::Vec3;
-use vg_geometry::Result;
-use vg_geometry::Similarity;
 use vg_geometry::progress::{Context, ProgressCallback, Threads};
+use vg_geometry::{Result, Similarity};
 use vg_scene::{Scene, View};
 use vg_splat::Gaussians;
 

@@ -5,9 +5,8 @@ use super::report::LeftOut;
 use super::run::Run;
 use super::{cap, plan};
 use rayon::prelude::*;
-use vg_geometry::Camera;
 use vg_geometry::progress::Context;
-use vg_geometry::{Error, Result};
+use vg_geometry::{Camera, Error, Result};
 use vg_scene::{Scene, View, resize, undistort};
 
 /// Removes the lens distortion and resamples the views, to fewer pixels where the model would exceed its cap.

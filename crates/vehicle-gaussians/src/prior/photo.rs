@@ -13,8 +13,7 @@ use super::volume::{Field, march};
 use glam::Vec3;
 use rayon::prelude::*;
 use serde::Serialize;
-use vg_geometry::MIRROR_Y;
-use vg_geometry::Result;
+use vg_geometry::{MIRROR_Y, Result};
 use vg_scene::View;
 use vg_scene::visibility::{Observer, Sight};
 

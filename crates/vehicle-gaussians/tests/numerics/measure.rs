@@ -5,11 +5,10 @@ use std::sync::OnceLock;
 use std::time::Instant;
 use vg::render::reference::Parameters;
 use vg::render::{CpuRenderer, PictureGradient, Reference};
-use vg_testing::Random;
 use vg_testing::gradients::{
     all_finite, difference, gradient_entry, largest, largest_of, noise, sampled, tensors,
 };
-use vg_testing::is_finite;
+use vg_testing::{Random, is_finite};
 
 /// Largest and root mean square error.
 #[derive(Clone, Copy, Debug, Default)]

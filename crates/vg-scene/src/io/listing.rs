@@ -10,8 +10,7 @@ use super::{colmap, image, json, realcar, transforms};
 use crate::VehicleBox;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use vg_geometry::Camera;
-use vg_geometry::{Error, Result};
+use vg_geometry::{Camera, Error, Result};
 
 /// A scene's views in the world of its files.
 #[derive(Clone, Debug)]

@@ -9,8 +9,7 @@ use crate::{Scene, VehicleBox};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 use vg_geometry::progress::{UNWATCHED, Watch};
-use vg_geometry::{Camera, Similarity};
-use vg_geometry::{Error, Result};
+use vg_geometry::{Camera, Error, Result, Similarity};
 
 pub use super::listing::DepthFile;
 

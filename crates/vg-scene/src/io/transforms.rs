@@ -12,8 +12,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use vg_geometry::camera::MAX_SIDE;
 use vg_geometry::frame::pose_from_opengl;
-use vg_geometry::{Camera, CameraModel, Distortion, Intrinsics, Pose};
-use vg_geometry::{Error, Result};
+use vg_geometry::{Camera, CameraModel, Distortion, Error, Intrinsics, Pose, Result};
 
 /// Content of a `transforms.json`.
 #[derive(Clone, Debug, PartialEq)]

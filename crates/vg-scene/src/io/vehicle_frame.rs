@@ -5,8 +5,7 @@ use super::{json, listing, select};
 use glam::DVec3;
 use serde_json::Value;
 use std::path::Path;
-use vg_geometry::{Error, Result};
-use vg_geometry::{RobustFit, Similarity};
+use vg_geometry::{Error, Result, RobustFit, Similarity};
 
 /// Maximum size of a file, bytes.
 const MAX_FILE: u64 = 4 << 20;

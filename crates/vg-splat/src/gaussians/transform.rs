@@ -8,8 +8,7 @@ use super::buffer::{Gaussians, MovedArrays, SCALE_RANGE};
 use super::sh;
 use glam::{DMat3, DQuat, DVec3, Vec3};
 use rayon::prelude::*;
-use vg_geometry::{Error, Result};
-use vg_geometry::{Pose, Similarity};
+use vg_geometry::{Error, Pose, Result, Similarity};
 
 /// Limit of the coordinates of means, metres. An f32 has 24 significant bits: from 2^e to 2^(e + 1) its step is
 /// 2^(e - 23), which is 0.98 mm below 2^14 m and 1.95 mm from there on.

@@ -10,10 +10,9 @@ use super::{
 };
 use crate::gaussians::Gaussians;
 use rayon::prelude::*;
-use vg_geometry::Camera;
-use vg_geometry::Result;
 use vg_geometry::camera::MAX_SIDE;
 use vg_geometry::resample::{Taps, pinhole_for};
+use vg_geometry::{Camera, Result};
 
 /// Pinhole pixels per pixel and axis. Interpolation at this spacing preserves the peak of the smallest splat, whose
 /// standard deviation is sqrt(0.3) pixels, to 10 %, and its centroid and sum exactly.

@@ -8,8 +8,7 @@
 use crate::gaussians::Gaussians;
 use crate::render::{RenderOptions, Rendered, Renderer};
 use glam::{DMat3, DQuat, DVec3};
-use vg_geometry::{Camera, Pose};
-use vg_geometry::{Error, Result};
+use vg_geometry::{Camera, Error, Pose, Result};
 
 /// Gradient of a loss with respect to a picture's planes. An empty plane is one on which the loss does not depend.
 #[derive(Clone, Debug, Default, PartialEq)]

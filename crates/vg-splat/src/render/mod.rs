@@ -26,8 +26,7 @@ pub use picture::Picture;
 pub use reference::{Reference, ReferenceGradients};
 
 use crate::gaussians::Gaussians;
-use vg_geometry::Camera;
-use vg_geometry::Result;
+use vg_geometry::{Camera, Result};
 
 /// Renders Gaussians as a camera sees them.
 pub trait Renderer {

@@ -5,8 +5,7 @@ use super::cpu::Watched;
 use super::{GpuAsset, GpuRenderer, gpu::Target};
 use super::{RenderOptions, Rendered, Rgba8};
 use crate::gaussians::Gaussians;
-use vg_geometry::Camera;
-use vg_geometry::Result;
+use vg_geometry::{Camera, Result};
 
 /// [`Rendered`], or [`Rgba8`], which takes a fifth of the transfer from a device. Sealed.
 pub trait Picture: Default + inside::Drawn {}

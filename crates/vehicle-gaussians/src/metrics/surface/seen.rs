@@ -3,8 +3,7 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use vg_geometry::progress::Watch;
-use vg_geometry::{Camera, Intrinsics, Pose};
-use vg_geometry::{Error, Result};
+use vg_geometry::{Camera, Error, Intrinsics, Pose, Result};
 use vg_splat::Gaussians;
 use vg_splat::render::{CpuRenderer, RenderOptions, Rendered, Renderer};
 

@@ -5,8 +5,7 @@ use super::silhouette::{Silhouette, central_ray};
 use crate::prior::{BoxSource, WorkingBox};
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
-use vg_geometry::MIRROR_Y;
-use vg_geometry::{Error, Result};
+use vg_geometry::{Error, MIRROR_Y, Result};
 use vg_scene::View;
 
 /// Size of the largest road vehicles, metres (length of an articulated bus, width and height of a lorry

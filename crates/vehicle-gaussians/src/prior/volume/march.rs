@@ -3,8 +3,7 @@
 use super::field::Field;
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
-use vg_geometry::Intrinsics;
-use vg_geometry::Result;
+use vg_geometry::{Intrinsics, Result};
 use vg_scene::mask::Label;
 use vg_scene::{DepthMap, View};
 

@@ -7,8 +7,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use vg_geometry::camera::MAX_SIDE;
 use vg_geometry::frame::pose_from_colmap;
-use vg_geometry::{Camera, CameraModel, Pose};
-use vg_geometry::{Error, Result};
+use vg_geometry::{Camera, CameraModel, Error, Pose, Result};
 
 /// Longest model file that is read; an image with ten thousand features takes 240 kB.
 const MAX_FILE: u64 = 2 << 30;

@@ -6,9 +6,8 @@ use super::{CpuRenderer, Job, Level, Scratch, StageTimes, Watched};
 use crate::gaussians::Gaussians;
 use crate::render::{Differentiable, Gradients, PictureGradient, RenderOptions, Rendered};
 use std::time::{Duration, Instant};
-use vg_geometry::Camera;
-use vg_geometry::Result;
 use vg_geometry::progress::UNWATCHED;
+use vg_geometry::{Camera, Result};
 
 /// Wall time of each stage of a picture and its gradients.
 #[derive(Clone, Copy, Debug, Default)]

@@ -31,9 +31,8 @@ use splat::{PixelBounds, Splat};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tile::{Planes, TILE_HEIGHT, TILE_WIDTH, Tile};
-use vg_geometry::Camera;
-use vg_geometry::Result;
 use vg_geometry::progress::{UNWATCHED, Watch};
+use vg_geometry::{Camera, Result};
 pub use watched::Watched;
 
 /// Gaussians projected by one task: enough to hide its overhead, few enough to keep threads evenly busy.

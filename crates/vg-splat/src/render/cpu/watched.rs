@@ -3,9 +3,8 @@
 use super::{CpuRenderer, Job, Level, StageTimes, draw};
 use crate::gaussians::Gaussians;
 use crate::render::{RenderOptions, Rendered, Renderer};
-use vg_geometry::Camera;
-use vg_geometry::Result;
 use vg_geometry::progress::Watch;
+use vg_geometry::{Camera, Result};
 
 /// A renderer whose pictures can be cancelled: with [`Error::Cancelled`](vg_geometry::Error::Cancelled), and unspecified
 /// contents of the target.

@@ -6,8 +6,7 @@ use super::memory::{storage, uniform};
 use crate::gaussians::{Gaussians, sh};
 use glam::DVec3;
 use std::sync::atomic::{AtomicU64, Ordering};
-use vg_geometry::Camera;
-use vg_geometry::Result;
+use vg_geometry::{Camera, Result};
 
 /// Number of floats of a Gaussian without its colour: mean, quaternion, standard deviations, opacity.
 const SHAPE: usize = 11;

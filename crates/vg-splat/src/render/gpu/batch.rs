@@ -6,8 +6,7 @@ use super::draw::{Flight, Pixels, Rows, Target, first_guess, pixels, tiles};
 use super::frame::TILE;
 use super::memory::Memory;
 use crate::render::{Picture, RenderOptions};
-use vg_geometry::Camera;
-use vg_geometry::Result;
+use vg_geometry::{Camera, Result};
 
 impl GpuRenderer {
     /// Renders a picture for each camera into the memory of `picture` and passes it to `take` with the camera's index,

@@ -7,8 +7,7 @@ use super::memory::{Memory, NUMBERS, PIXEL, Readback, Source};
 use super::stages::{Stages, significant_bits};
 use super::{GpuRenderer, MOST_TILES};
 use crate::render::{RenderOptions, Rendered};
-use vg_geometry::Camera;
-use vg_geometry::Result;
+use vg_geometry::{Camera, Result};
 
 /// Splats of a slice where the driver ends long loops early.
 const FEW: u32 = 1 << 15;

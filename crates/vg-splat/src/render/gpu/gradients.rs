@@ -15,8 +15,7 @@ use crate::gaussians::Gaussians;
 use crate::render::cpu::backward::{Decided, Shares, SplatSums, gradient_scale};
 use crate::render::{Background, Differentiable, Gradients, PictureGradient, RenderOptions, Rendered};
 use rayon::prelude::*;
-use vg_geometry::Camera;
-use vg_geometry::Result;
+use vg_geometry::{Camera, Result};
 
 /// A part of a band, in tiles.
 #[derive(Clone, Copy)]

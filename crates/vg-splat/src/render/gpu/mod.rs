@@ -27,8 +27,7 @@ use device::Device;
 use kernels::Kernels;
 use memory::{Memory, SPLAT};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
-use vg_geometry::Camera;
-use vg_geometry::{Error, Result};
+use vg_geometry::{Camera, Error, Result};
 
 /// Bounds of working memory; tests lower them.
 #[derive(Clone, Copy, Debug)]

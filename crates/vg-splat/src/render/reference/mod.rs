@@ -17,8 +17,7 @@ use crate::render::{
     Background, Differentiable, Gradients, PictureGradient, RenderOptions, Rendered, Renderer, distorted,
 };
 use project::{Projected, Variables};
-use vg_geometry::Result;
-use vg_geometry::{Camera, Intrinsics};
+use vg_geometry::{Camera, Intrinsics, Result};
 
 /// The brute-force renderer.
 #[derive(Clone, Copy, Debug, Default)]
