@@ -38,7 +38,7 @@ fn invalid_refinements_are_errors() {
         at,
         &format!("refine {asset} . --backend cuda -o {{}}/r.ply"),
         2,
-        &["--backend", "auto, cpu or gpu"],
+        &["--backend", "possible values: auto, cpu, gpu"],
     );
     if !cfg!(feature = "gpu") {
         let words = ["options.refine.backend: gpu is not in this build", "feature gpu"];
