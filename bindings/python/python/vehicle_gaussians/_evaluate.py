@@ -26,17 +26,18 @@ class ViewScore(NamedTuple):
     name: str
     """The view's name."""
     psnr_db: float
-    """Peak signal-to-noise ratio over the full frame, dB."""
+    """Peak signal-to-noise ratio over the full frame, dB; infinite for equal pictures."""
     psnr_box_db: float | None
-    """The same inside the bounding box of the mask; None where the mask is empty."""
+    """Peak signal-to-noise ratio inside the bounding box of the mask, dB; None where the mask is empty."""
     ssim: float | None
     """Structural similarity over the full frame, at most 1; None for a picture smaller than 11x11."""
     lpips: float | None
     """None without a model that measures it, and for a picture smaller than 64x64."""
     silhouette_iou: float
-    """Intersection over union of the mask and the pixels that the model covers by half or more."""
+    """Intersection over union of the mask and the pixels that the model covers by half or more, 0 to 1."""
     depth_mae_m: float | None
-    """Mean absolute difference of depth, metres; None without depth."""
+    """Mean absolute difference of depth where the view has depth and the model covers the pixel by half or more,
+    metres; None where that is nowhere."""
     depth_p90_m: float | None
     """90th percentile of that difference, metres."""
 
