@@ -59,26 +59,16 @@ fn assert_in_step(path: &str, generate: fn(&str) -> String) {
     assert_golden(&path, &generate(&written), why);
 }
 
+/// One after the other: each rewrites files that another has a part in.
 #[test]
-fn the_options_of_c_are_the_librarys() {
-    assert_in_step("src/capi/options.rs", c::options);
-}
-
-#[test]
-fn the_enumerations_of_c_are_the_librarys() {
+fn options_enumerations_and_measures_of_c_are_the_librarys() {
     for file in ["align", "model", "options", "refine", "render", "report"] {
         assert_in_step(&format!("src/capi/{file}.rs"), c::enumerations);
     }
-}
-
-#[test]
-fn the_second_witness_of_the_abi_names_them_all() {
-    assert_in_step("src/capi/tests.rs", c::witness);
-}
-
-#[test]
-fn the_measures_of_c_are_the_librarys() {
+    assert_in_step("src/capi/options.rs", c::options);
     assert_in_step("src/capi/metrics.rs", c::measures);
+    // The second witness of the ABI names them all.
+    assert_in_step("src/capi/tests.rs", c::witness);
 }
 
 #[test]
