@@ -165,7 +165,7 @@ fn masks_and_alpha_give_the_alignment_of_rust_to_the_byte() {
     let measures = [expected.residual_m, expected.confidence, expected.residual_px, expected.other_px];
     assert_same(&by_scan(&some, null()).unwrap(), &expected.vehicle_from_world, measures, 3);
     let refused = by_scan(&|_| Silhouette::Nothing, null()).unwrap_err();
-    assert!(refused.starts_with("views: 0 with a mask"), "{refused}");
+    assert!(refused.starts_with("views: 0 of 8 have a mask"), "{refused}");
 
     let lent = lent(&lent_views, |_| Silhouette::Mask);
     let by_box = |heading| {

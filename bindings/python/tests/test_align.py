@@ -142,7 +142,7 @@ def test_what_cannot_be_aligned_is_named(face: Any, whole: vg.Scene, scan: npt.N
         (lambda: face.align_scan(*views, scan[:, :2]), r"^scan: shape .*allowed: \(n, 3\)"),
         (lambda: face.align_scan(*views, scan, [[0, 0, np.nan]]), r"^sparse\[0\]: "),
         (lambda: face.align_scan(*views, scan, heading="left"), r"^heading: .left.; allowed: auto"),
-        (lambda: face.align_scan([None] * 8, whole.cameras, scan), r"^views: 0 with a mask"),
+        (lambda: face.align_scan([None] * 8, whole.cameras, scan), r"^views: 0 of 8 have a mask"),
         (lambda: face.align_box(*views, ground, size, heading="forward"), r"^sparse: 3 points that show no ground"),
         (lambda: face.align_box(*views, ground, (4500, 1800, 1500), heading="forward"), r"^size: "),
         (lambda: face.align_points(np.eye(3), np.eye(3)[:2]), r"^vehicle: 2; allowed: as many as world, 3"),
