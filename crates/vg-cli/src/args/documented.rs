@@ -7,7 +7,8 @@ use std::fmt::Write;
 use vg_testing::root;
 use vg_testing::tools::assert_golden;
 
-const START: &str = "<!-- The options, generated from the program: cargo test -p vg-cli --bin vg documented -->\n";
+const START: &str =
+    "<!-- The options, generated from the program: cargo test -p vg-cli --bin vg documented -->\n";
 const END: &str = "<!-- The end of the options. -->\n";
 
 /// An option, and the commands that have it.
