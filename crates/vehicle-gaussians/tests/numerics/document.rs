@@ -16,8 +16,8 @@ const HEAD: &str = "\
 # Behaviour at numerical limits
 
 Behaviour on stiff and extreme input: either an error that names the argument, or a finite result with a bounded distance from
-the f64 reference (`render::Reference`). This page is written by `crates/vehicle-gaussians/tests/numerics`, whose tests check each row against its bound
-and this page against the rows:
+the f64 reference (`render::Reference`). This page is written by
+`crates/vehicle-gaussians/tests/numerics`, whose tests check each row against its bound and this page against the rows:
 
 ```text
 VG_BLESS=1 cargo test --test numerics      writes this page
