@@ -1,4 +1,4 @@
-//! Structs of measures whose fields are written once, with [`measures!`](crate::measures): name, documentation, heading,
+//! Structs of measures whose fields are written once, with [`measures!`](crate::measures!): name, documentation, heading,
 //! digits, direction. Means, tables, C and Python follow.
 
 /// A measure as data.

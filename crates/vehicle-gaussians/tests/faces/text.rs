@@ -109,7 +109,7 @@ pub(crate) fn named_line(line: &str, indent: &str) -> Option<String> {
 /// `VG_PRIOR_SHAPE` of `prior` and `Shape`.
 pub(crate) fn shouted(name: &str) -> String {
     let mut shouted = String::new();
-    for (i, c) in name.chars().enumerate() {
+    for (i, c) in name.char_indices() {
         if c.is_uppercase() && i > 0 && !name[..i].ends_with('_') {
             shouted.push('_');
         }

@@ -9,6 +9,9 @@ use std::path::Path;
 use vg_geometry::Result;
 use vg_splat::Gaussians;
 
+/// Reads a model from front to back.
+pub type Reader = fn(&mut dyn BufRead, Option<u64>, &Path) -> Result<(Gaussians, PlyNotes)>;
+
 /// A format of models in files.
 #[derive(Clone, Copy, Debug)]
 pub struct SplatFormat {
@@ -19,7 +22,7 @@ pub struct SplatFormat {
     /// Whether a file is of this format, by its first bytes.
     pub recognizes: fn(&[u8]) -> bool,
     /// Reads a model from front to back; the length is a file's, a pipe has none; the path is for messages.
-    pub read: fn(&mut dyn BufRead, Option<u64>, &Path) -> Result<(Gaussians, PlyNotes)>,
+    pub read: Reader,
     /// Writes a model.
     pub write: fn(&mut dyn Write, &Gaussians) -> std::io::Result<()>,
 }
