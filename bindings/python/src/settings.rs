@@ -43,7 +43,7 @@ fn value(object: &Bound<'_, PyAny>, name: &str, field: &Field) -> PyResult<Value
 /// Everything of a set.
 const ALL: &str = "all";
 
-/// What may be chosen.
+/// Names of the values that a field can have.
 fn names(field: &Field) -> Vec<String> {
     let (Kind::Choice(enumeration) | Kind::Set(enumeration)) = field.kind else { return Vec::new() };
     enumeration().variants.iter().map(|variant| variant.name.to_owned()).collect()

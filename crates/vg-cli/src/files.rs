@@ -1,6 +1,6 @@
 //! Output files and folders: checked before the work starts; a file is written completely or not at all.
 
-use crate::guard::{self, Inputs};
+use crate::guard::{self, Inputs, is_standard_output};
 use crate::job::{Failure, Outcome, Result, USAGE};
 use crate::shown;
 use std::io::{BufWriter, ErrorKind, IsTerminal, Write};
@@ -109,12 +109,6 @@ impl Results {
             false => outcome,
         }
     }
-}
-
-/// Whether this name is standard output: `-`, or the system's name for it.
-pub(crate) fn is_standard_output(path: &Path) -> bool {
-    let names = ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
-    names.iter().any(|name| path.as_os_str() == *name)
 }
 
 /// The file to read for this name: `-` is standard input.

@@ -3,7 +3,6 @@
 //! Files are identified by the file system, not by the spelling of their names. No result is written into a scene's
 //! folders of pictures, masks, depth and COLMAP models, because a new picture there would become part of the scene.
 
-use crate::files::is_standard_output;
 use crate::job::{Failure, Result};
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::fs;
@@ -218,6 +217,12 @@ fn refuse_repeated(results: &[&PathBuf], places: &[PathBuf]) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Whether this name is standard output: `-`, or the system's name for it.
+pub(crate) fn is_standard_output(path: &Path) -> bool {
+    let names = ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
+    names.iter().any(|name| path.as_os_str() == *name)
 }
 
 #[cfg(test)]

@@ -33,17 +33,20 @@ impl Intrinsics {
     }
 
     /// Converts normalised coordinates (x/z, y/z) to pixel coordinates.
+    #[inline]
     pub fn pixel_from_normalized(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.fx * x + self.cx, self.fy * y + self.cy]
     }
 
     /// Converts pixel coordinates to normalised coordinates (x/z, y/z).
+    #[inline]
     pub fn normalized_from_pixel(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         [(u - self.cx) / self.fx, (v - self.cy) / self.fy]
     }
 
     /// The ray through the centre of the pixel in column `u`, row `v`, in the camera frame: (x/z, y/z, 1), so that a
     /// multiple of it by z has planar depth z. Without a lens; [`Camera::ray`] knows one.
+    #[inline]
     pub fn pixel_ray(&self, u: u32, v: u32) -> DVec3 {
         let [x, y] = self.normalized_from_pixel([f64::from(u) + 0.5, f64::from(v) + 0.5]);
         DVec3::new(x, y, 1.0)
@@ -293,6 +296,7 @@ impl Camera {
     }
 
     /// Projects a point of the camera frame to its pixel; `None` on or behind the camera plane.
+    #[inline]
     pub fn project(&self, point_camera: DVec3) -> Option<[f64; 2]> {
         if point_camera.z <= 0.0 {
             return None;
@@ -302,6 +306,7 @@ impl Camera {
     }
 
     /// Direction (x/z, y/z, 1) of a pixel's ray in the camera frame; `None` where the lens has no such ray.
+    #[inline]
     pub fn ray(&self, pixel: [f64; 2]) -> Option<DVec3> {
         let [x, y] = self.distortion.undistort(self.intrinsics.normalized_from_pixel(pixel))?;
         Some(DVec3::new(x, y, 1.0))

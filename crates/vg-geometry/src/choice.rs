@@ -1,5 +1,6 @@
-//! Enumerations that users choose from. Names, numbers and documentation are written once, with [`choices!`](crate::choices!); the
-//! program, C and Python parse by them, and their declarations and documentation are generated from them.
+//! Enumerations that users choose from. Names, numbers and documentation are written once, with
+//! [`choices!`](crate::choices!); the program, C and Python parse by them, and their declarations and documentation are
+//! generated from them.
 
 use crate::{Error, Result};
 

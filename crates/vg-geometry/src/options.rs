@@ -1,5 +1,5 @@
-//! Structs of options whose fields are written once, with [`options!`](crate::options!): name, type, default, range, documentation. The
-//! program and Python set them by the table, C's struct and all documentation are generated from it.
+//! Structs of options whose fields are written once, with [`options!`](crate::options!): name, type, default, range,
+//! documentation. The program and Python set them by the table, C's struct and all documentation are generated from it.
 
 use crate::choice::Enumeration;
 use crate::{Error, Result};

@@ -73,12 +73,14 @@ impl Pose {
     }
 
     /// The inverse transform: `from_to` of this `to_from`.
+    #[inline]
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.transpose();
         Self { rotation, translation: -(rotation * self.translation) }
     }
 
     /// Maps a point, metres.
+    #[inline]
     pub fn transform_point(&self, p: DVec3) -> DVec3 {
         self.rotation * p + self.translation
     }

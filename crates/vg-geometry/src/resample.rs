@@ -83,6 +83,7 @@ pub struct Taps {
 
 impl Taps {
     /// The taps of a position; pixel centres lie at (u + 0.5, v + 0.5).
+    #[inline]
     pub fn new([x, y]: [f32; 2], width: u32, height: u32) -> Self {
         let (x, y) = (x - 0.5, y - 0.5);
         let clamp = |v: f32, n: u32| v.clamp(0.0, (n - 1) as f32) as usize;
@@ -93,12 +94,14 @@ impl Taps {
     }
 
     /// Weights of the four pixels, in the order of `index`; their sum is 1.
+    #[inline]
     pub fn weights(&self) -> [f32; 4] {
         let (x, y) = (self.across, self.down);
         [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y]
     }
 
     /// Bilinear interpolation of four values in the order of `index`.
+    #[inline]
     pub fn blend(&self, [a, b, c, d]: [f32; 4]) -> f32 {
         let top = a + (b - a) * self.across;
         let bottom = c + (d - c) * self.across;
@@ -106,6 +109,7 @@ impl Taps {
     }
 
     /// Row-order index of the pixel that contains the position.
+    #[inline]
     pub fn nearest(&self) -> usize {
         self.index[usize::from(self.across >= 0.5) + 2 * usize::from(self.down >= 0.5)]
     }

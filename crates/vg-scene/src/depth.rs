@@ -56,26 +56,31 @@ impl DepthMap {
     }
 
     /// Columns.
+    #[inline]
     pub fn width(&self) -> u32 {
         self.width
     }
 
     /// Rows.
+    #[inline]
     pub fn height(&self) -> u32 {
         self.height
     }
 
     /// Planar z in metres in row order, 0 without a measurement. `[height * width]`
+    #[inline]
     pub fn depth(&self) -> &[f32] {
         &self.depth
     }
 
     /// Confidence in [0, 1] in row order, if the source provides it. `[height * width]`
+    #[inline]
     pub fn confidence(&self) -> Option<&[f32]> {
         self.confidence.as_deref()
     }
 
     /// Depth in column u, row v, or `None` without a measurement.
+    #[inline]
     pub fn get(&self, u: u32, v: u32) -> Option<f32> {
         let d = self.depth[v as usize * self.width as usize + u as usize];
         (d > 0.0).then_some(d)

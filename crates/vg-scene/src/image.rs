@@ -90,21 +90,25 @@ impl RgbImage {
     }
 
     /// Columns.
+    #[inline]
     pub fn width(&self) -> u32 {
         self.width
     }
 
     /// Rows.
+    #[inline]
     pub fn height(&self) -> u32 {
         self.height
     }
 
     /// Pixels in row order. `[height * width]`
+    #[inline]
     pub fn pixels(&self) -> &[[u8; 3]] {
         self.bytes.as_chunks().0
     }
 
     /// The pixel in column u, row v.
+    #[inline]
     pub fn get(&self, u: u32, v: u32) -> [u8; 3] {
         self.pixels()[v as usize * self.width as usize + u as usize]
     }

@@ -64,21 +64,25 @@ impl Mask {
     }
 
     /// Columns.
+    #[inline]
     pub fn width(&self) -> u32 {
         self.width
     }
 
     /// Rows.
+    #[inline]
     pub fn height(&self) -> u32 {
         self.height
     }
 
     /// Labels in row order. `[height * width]`
+    #[inline]
     pub fn labels(&self) -> &[Label] {
         &self.labels
     }
 
     /// Whether the pixel in column u, row v is vehicle.
+    #[inline]
     pub fn is_vehicle(&self, u: u32, v: u32) -> bool {
         self.labels[v as usize * self.width as usize + u as usize] == Label::Vehicle
     }

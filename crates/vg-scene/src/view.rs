@@ -69,6 +69,7 @@ impl View {
 
     /// The point at planar depth `z` metres on the ray of the centre of pixel (u, v) of a pinhole view, vehicle frame
     /// (paper eqs. 3, 4).
+    #[inline]
     pub fn lift(&self, u: u32, v: u32, z: f32) -> Vec3 {
         let point_camera = self.camera.intrinsics.pixel_ray(u, v) * f64::from(z);
         self.camera.vehicle_from_camera.transform_point(point_camera).as_vec3()

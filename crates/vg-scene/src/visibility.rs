@@ -33,6 +33,7 @@ pub struct Observer<'a> {
 
 impl<'a> Observer<'a> {
     /// The observer of an undistorted view.
+    #[inline]
     pub fn new(view: &'a View, depth: &'a DepthMap) -> Self {
         let camera_from_vehicle = view.camera.vehicle_from_camera.inverse();
         let Intrinsics { fx, fy, cx, cy } = view.camera.intrinsics;
@@ -49,6 +50,7 @@ impl<'a> Observer<'a> {
     }
 
     /// Visibility of `point` (vehicle frame), for surfaces with a tolerance of `tolerance` metres.
+    #[inline]
     pub fn sight(&self, point: Vec3, tolerance: f32) -> Sight {
         let p = self.camera_from_vehicle.0 * point + self.camera_from_vehicle.1;
         if p.z <= 0.0 {
@@ -87,6 +89,7 @@ impl<'a> Observer<'a> {
 
     /// Resolution of a surface at `point` with unit `normal` (vehicle frame), pixels per metre in the direction in
     /// which it is foreshortened. Negative from behind.
+    #[inline]
     pub fn resolution(&self, point: Vec3, normal: Vec3) -> f32 {
         let to_camera = self.center - point;
         let focal = self.intrinsics[0].min(self.intrinsics[1]);

@@ -29,8 +29,8 @@ use vg_geometry::{Error, Pose, Result};
 use vg_scene::View;
 use vg_scene::undistort::undistorted;
 
-/// A view whose camera is posed in the world: callers put that pose into the field for the vehicle frame, which is still
-/// to be found.
+/// A view whose camera is posed in the world: its field for the pose in the vehicle frame, which is still to be found,
+/// holds that pose.
 #[derive(Clone, Copy)]
 struct WorldView<'a>(&'a View);
 

@@ -109,7 +109,8 @@ impl<'r, 'c> Run<'r, 'c> {
 /// long ones, and at the end; if it breaks, the call returns [`Error::Cancelled`](vg_geometry::Error::Cancelled).
 ///
 /// # Errors
-/// [`Error::Argument`](vg_geometry::Error::Argument) for bad options or a bad scene, else the error of the stage that failed.
+/// [`Error::Argument`](vg_geometry::Error::Argument) for bad options or a bad scene, else the error of the stage that
+/// failed.
 pub fn reconstruct<'a>(
     scene: &Scene,
     options: &Options,
@@ -131,8 +132,8 @@ pub fn reconstruct_on<'a>(
     reconstruct_with(&Parts::default(), threads, scene, options, progress)
 }
 
-/// Reconstructs the vehicle of `scene` (paper eq. 1) with a depth prior or a Gaussian head of the caller's own. The report names them
-/// by their `name()`.
+/// Reconstructs the vehicle of `scene` (paper eq. 1) with a depth prior or a Gaussian head of the caller's own. The
+/// report names them by their `name()`.
 ///
 /// ```
 /// use std::ops::ControlFlow;

@@ -179,6 +179,7 @@ impl Gaussians {
     }
 
     /// Appends one Gaussian that meets the invariants; bands above degree 0 become zero.
+    #[inline]
     pub fn push(&mut self, g: &Gaussian) {
         debug_assert!(g.is_storable(), "{g:?}");
         self.means.push(g.mean);
@@ -303,46 +304,55 @@ impl Gaussians {
     }
 
     /// The number of Gaussians.
+    #[inline]
     pub fn len(&self) -> usize {
         self.means.len()
     }
 
     /// Whether there are no Gaussians.
+    #[inline]
     pub fn is_empty(&self) -> bool {
         self.means.is_empty()
     }
 
     /// Highest SH degree stored, 0 to 3.
+    #[inline]
     pub fn sh_degree(&self) -> u8 {
         self.sh_degree
     }
 
     /// Floats of SH per Gaussian: (degree + 1)^2 * 3.
+    #[inline]
     pub fn sh_stride(&self) -> usize {
         sh::coefficients(self.sh_degree) * 3
     }
 
     /// Centres in metres. `[n][3]`
+    #[inline]
     pub fn means(&self) -> &[[f32; 3]] {
         &self.means
     }
 
     /// `vehicle_from_gaussian`, unit quaternions (w, x, y, z). `[n][4]`
+    #[inline]
     pub fn rotations(&self) -> &[[f32; 4]] {
         &self.rotations
     }
 
     /// Standard deviations in metres. `[n][3]`
+    #[inline]
     pub fn scales(&self) -> &[[f32; 3]] {
         &self.scales
     }
 
     /// Peak opacities in [0, 1]. `[n]`
+    #[inline]
     pub fn opacities(&self) -> &[f32] {
         &self.opacities
     }
 
     /// SH coefficients, `[n][(degree + 1)^2][3]`, RGB innermost.
+    #[inline]
     pub fn sh(&self) -> &[f32] {
         &self.sh
     }
@@ -415,6 +425,7 @@ fn gather<T: Copy>(values: &[T], runs: &[Range<usize>], stride: usize) -> Vec<T>
 
 /// The unit quaternion along `q`; `None` if it is zero or not finite. Computed in f64, where the square of a finite f32
 /// neither overflows nor underflows.
+#[inline]
 pub fn normalize_quaternion(q: [f32; 4]) -> Option<[f32; 4]> {
     let norm = q.iter().map(|&v| f64::from(v).powi(2)).sum::<f64>().sqrt();
     (norm > 0.0 && norm.is_finite()).then(|| q.map(|v| (f64::from(v) / norm) as f32))

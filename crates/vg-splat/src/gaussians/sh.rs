@@ -10,6 +10,7 @@ pub const MAX_DEGREE: u8 = 3;
 pub const Y0: f32 = 0.282_094_79;
 
 /// Number of coefficients per colour channel up to `degree`.
+#[inline]
 pub const fn coefficients(degree: u8) -> usize {
     (degree as usize + 1) * (degree as usize + 1)
 }
@@ -23,6 +24,7 @@ pub const ODD_IN_Y: [bool; 16] = [
 ];
 
 /// Coefficient of degree 0 of colour `rgb` in [0, 1], RGB2SH (paper eq. 9): 2 sqrt(pi) (rgb - 0.5).
+#[inline]
 pub fn from_rgb(rgb: [f32; 3]) -> [f32; 3] {
     rgb.map(|c| (c - 0.5) / Y0)
 }
@@ -33,6 +35,7 @@ pub fn to_rgb(sh0: [f32; 3]) -> [f32; 3] {
 }
 
 /// All basis functions up to `degree` at the unit direction (x, y, z); the rest of the array is zero.
+#[inline]
 pub fn basis([x, y, z]: [f64; 3], degree: u8) -> [f64; 16] {
     let mut b = [0.0; 16];
     b[0] = 0.282_094_791_773_878_14;

@@ -1,4 +1,4 @@
-//! Depth from a network in an ONNX file (paper eq. 2): MapAnything, or any other that keeps the contract (docs/ONNX.md).
+//! Depth from a network in an ONNX file (paper eq. 2): MapAnything, or another that keeps the contract (docs/ONNX.md).
 //!
 //! The network's rays and cameras are only checked: a pixel's direction comes from the caller's intrinsics and its
 //! position from the caller's pose, so that pictures and model line up. The network contributes distance alone. The

@@ -1,9 +1,9 @@
 //! 3D Gaussian splatting (Kerbl et al. 2023) as it is, for comparison: Gaussians from a sparse or random start, moved,
-//! divided and removed until their pictures are the input photographs. No prior, no symmetry, nothing of the unseen side.
+//! divided and removed until their pictures match the input photographs. It uses no prior and no symmetry.
 //!
 //! The loss is 0.8 |colour| + 0.2 (1 - SSIM) of the masked photograph on white, a mean over pixels and channels as the
-//! original's; pixels of which nothing is known count for nothing. One view a step, in a new order each round. All
-//! numbers are the original's for 30,000 steps; in a shorter run its schedule is shorter by the same factor.
+//! original's; unknown pixels have no weight. Each step uses one view, in a new order each round. All numbers are the
+//! original's for 30,000 steps; a shorter run shortens its schedule by the same factor.
 
 mod options;
 mod spacing;
@@ -23,7 +23,7 @@ use vg_geometry::progress::Context;
 use vg_scene::View;
 use vg_splat::Gaussians;
 
-/// The original's: smaller than any gradient.
+/// Adam's epsilon in the original: smaller than any gradient.
 const NOISE: f32 = 1e-15;
 
 /// Steps of a full run between one SH degree and the next.
@@ -81,7 +81,7 @@ pub(crate) fn fit(
     Ok((work.finished(&state, context), report))
 }
 
-/// SH degree after `made` of `planned` steps.
+/// The SH degree after `made` of `planned` steps.
 fn degree(made: u32, planned: u32, most: u8) -> u8 {
     let every = scaled(DEGREE_EVERY, planned).max(1);
     (made / every).min(most.into()) as u8

@@ -1,4 +1,4 @@
-//! What a caller may choose of the baseline.
+//! Settings of the baseline.
 
 use super::super::densify::{Densify, MOST};
 use super::super::{Amount, Rates, RefineOptions};
@@ -7,25 +7,26 @@ use vg_geometry::{Error, Result};
 use vg_splat::gaussians::sh;
 use vg_splat::render::Backend;
 
-/// Settings of 3D Gaussian splatting as a baseline; the defaults are the original's but for the length, which
-/// docs/BASELINE.md gives the reason of.
+/// Settings of 3D Gaussian splatting as a baseline; the defaults are the original's except for the length, whose
+/// reason is in docs/BASELINE.md.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BaselineOptions {
-    /// How long. The first steps tell how many fit into seconds; later ones take longer where Gaussians become many.
+    /// Length of the run. A number of seconds is converted to steps by the time of the first ones; later steps take
+    /// longer where Gaussians multiply.
     pub amount: Amount,
-    /// Gaussians to begin with, where they are drawn; at most so many of a cloud's points.
+    /// Number of random first Gaussians; with a cloud, the largest number of its points.
     pub points: usize,
-    /// Highest SH degree of the colour, 0 to 3: the steps begin with 0 and reach it one by one.
+    /// Highest SH degree of the colour, 0 to 3: the run begins with 0 and raises it one by one.
     pub sh_degree: u8,
     /// Step sizes at the beginning, those of centres as a share of the cameras' extent.
     pub rates: Rates,
     /// Step size of centres at the end, as a share of that at the beginning.
     pub last_means_rate: f32,
-    /// Weight of 1 - SSIM beside that of the mean absolute difference of colours, which is the rest to 1.
+    /// Weight of 1 - SSIM; the mean absolute difference of colours has the rest to 1.
     pub ssim: f32,
-    /// Density control; `None`: none.
+    /// Density control; `None` for no control.
     pub densify: Option<Densify>,
-    /// Whatever is drawn at random depends on it and on nothing else.
+    /// Seed of all random draws.
     pub seed: u64,
 }
 
@@ -53,7 +54,7 @@ impl Default for BaselineOptions {
 }
 
 impl BaselineOptions {
-    /// Each field in its range.
+    /// Checks that each field is in its range.
     ///
     /// # Errors
     /// [`Error::Argument`] with the field's name.
@@ -75,7 +76,7 @@ impl BaselineOptions {
         Ok(())
     }
 
-    /// As an optimisation whose loss has colours alone.
+    /// The optimisation's settings, with a loss of colours only.
     pub(super) fn settings(&self) -> RefineOptions {
         RefineOptions {
             amount: self.amount,
@@ -90,7 +91,7 @@ impl BaselineOptions {
         }
     }
 
-    /// Step sizes where `part` of the run is made, 0 to 1.
+    /// Step sizes after the fraction `part` of the run, 0 to 1.
     pub(super) fn rates_at(&self, part: f32) -> Rates {
         Rates { means: self.rates.means * self.last_means_rate.powf(part), ..self.rates }
     }

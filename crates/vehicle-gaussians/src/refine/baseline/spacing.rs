@@ -1,19 +1,19 @@
-//! How far points lie apart: the size that 3DGS gives a Gaussian at first.
+//! Distances between neighbouring points: the first size of a Gaussian in 3DGS.
 
 use glam::DVec3;
 use rayon::prelude::*;
 use vg_geometry::nearest::Nearest;
 
-/// Neighbours that are looked at.
+/// Number of neighbours.
 const NEIGHBOURS: usize = 3;
 
-/// The root of the mean square distance to the three nearest others, for each point, in the points' unit; of fewer
-/// points to those there are, and 0 of one alone.
+/// The root mean square distance of each point to its three nearest neighbours, in the points' unit; to fewer where there
+/// are not three, and 0 for a single point.
 pub(super) fn spacing(points: &[[f32; 3]]) -> Vec<f32> {
     let tree = Nearest::from_f32(points);
     let of = |(i, point): (usize, &[f32; 3])| {
         let mut near = tree.k_nearest(DVec3::from_array(point.map(f64::from)), NEIGHBOURS + 1);
-        // The point itself, but for as many others in the same place.
+        // The point itself, or another in the same place.
         let own = near.iter().position(|n| n.index == i).unwrap_or(near.len() - 1);
         near.remove(own);
         (near.iter().map(|n| n.squared).sum::<f64>() / near.len().max(1) as f64).sqrt() as f32
@@ -31,7 +31,7 @@ mod tests {
         for n in [0u64, 1, 2, 3, 9, 700] {
             let point = |i: u64| {
                 let mut rng = Rng::new([n, 1, i]);
-                // A coarse grid: many coincide or are equally far.
+                // A coarse grid, so that many points coincide or are equally far apart.
                 [(); 3].map(|()| (rng.uniform() * 12.0).floor() as f32)
             };
             let points: Vec<[f32; 3]> = (0..n).map(point).collect();

@@ -1,4 +1,4 @@
-//! What 3DGS starts from: points of a cloud where the scene has one, else points drawn from a box.
+//! The first Gaussians of 3DGS: points of a cloud if the scene has one, else points drawn from a box.
 
 use super::super::chance::{Rng, shuffled};
 use super::BaselineOptions;
@@ -12,28 +12,28 @@ use vg_scene::{Cloud, View};
 use vg_splat::Gaussians;
 use vg_splat::gaussians::buffer::Gaussian;
 
-/// Opacity at first.
+/// First opacity.
 const OPACITY: f32 = 0.1;
 
-/// Standard deviations at first, metres: the original's floor, and the most that is optimised.
+/// Bounds of the first standard deviations, metres: the original's floor, and the largest that is optimised.
 const SCALE_M: [f32; 2] = [3.2e-4, 3.0];
 
-/// Names of draws: those of the start are not those of rounds and steps.
+/// Streams of random draws, distinct from those of rounds and steps.
 const START: u64 = u64::MAX;
 
-/// The first Gaussians, and where they come from.
+/// The first Gaussians and their source.
 #[derive(Debug)]
 pub(crate) struct Start {
     pub(crate) gaussians: Gaussians,
-    /// What was filled, where there was no cloud.
+    /// The box that was filled, without a cloud.
     pub(crate) filled: Option<WorkingBox>,
-    /// Points of the cloud that no picture has.
+    /// Points of the cloud that are in no picture.
     pub(crate) strays: usize,
 }
 
 impl Start {
-    /// From the cloud's points that are in some picture, else from points in the box that bounds the silhouettes, of the
-    /// vehicle's size where that is known.
+    /// Starts from the cloud's points that are in some picture, else from points in the box that bounds the silhouettes,
+    /// which has the vehicle's size if that is known.
     pub(crate) fn new(
         views: &[View],
         cloud: Option<&Cloud>,
@@ -65,8 +65,8 @@ impl Start {
     }
 }
 
-/// The original's extent: 1.1 times the distance from the cameras' middle to the farthest of them, metres. Of a single
-/// place its distance from the Gaussians.
+/// The original's extent: 1.1 times the distance from the cameras' mean to the farthest of them, metres. For cameras in
+/// one place, their distance from the Gaussians.
 pub(crate) fn extent_m(views: &[View], gaussians: &Gaussians) -> f32 {
     let centers: Vec<DVec3> = views.iter().map(|v| v.camera.center()).collect();
     let farthest = |from: DVec3| centers.iter().map(|c| (*c - from).length()).fold(0.0, f64::max);
@@ -85,7 +85,7 @@ fn is_in_picture(view: &View, point: [f32; 3]) -> bool {
     p.z > 0.0 && camera.project(p).is_some_and(is_inside)
 }
 
-/// Points spread evenly over a box.
+/// Draws points evenly over a box.
 fn drawn(of: &WorkingBox, options: &BaselineOptions) -> Vec<[f32; 3]> {
     let point = |i: usize| {
         let mut rng = Rng::new([options.seed, START, i as u64]);
@@ -94,7 +94,7 @@ fn drawn(of: &WorkingBox, options: &BaselineOptions) -> Vec<[f32; 3]> {
     (0..options.points).map(point).collect()
 }
 
-/// Balls as large as their points lie apart, grey but for a trace: so the original begins without colours.
+/// Makes balls as large as the distance between their points, almost grey: the original begins like this without colours.
 fn made(points: &[[f32; 3]], options: &BaselineOptions) -> Gaussians {
     let mut gaussians = Gaussians::with_capacity(options.sh_degree, points.len());
     for (i, (mean, spacing)) in points.iter().zip(spacing(points)).enumerate() {
