@@ -425,7 +425,7 @@ fn alone_twenty_vehicles_leave_no_thread_of_their_model() {
 #[cfg(target_os = "linux")]
 fn twenty_vehicles_leave_no_thread_of_their_model() {
     let mut child = Command::new(std::env::current_exe().unwrap());
-    let name = "c_abi::alone_twenty_vehicles_leave_no_thread_of_their_model";
+    let name = "alone_twenty_vehicles_leave_no_thread_of_their_model";
     let output = child.args(["--exact", name, "--ignored", "--nocapture"]).output().unwrap();
     let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert!(output.status.success() && out.contains("1 passed"), "{out}{err}");
