@@ -129,7 +129,7 @@ fn the_program_makes_a_vehicle_of_photographs_without_masks() {
     let (code, _, error) = run(&[]);
     assert_eq!(code, Some(1), "{error}");
     assert!(
-        error.contains(".mask: none; allowed: a mask with the vehicle") && error.contains("mask model"),
+        error.contains(".mask: none; allowed: a mask that shows the vehicle") && error.contains("mask model"),
         "{error}"
     );
 
